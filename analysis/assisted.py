@@ -24,9 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from suave_des import load_scenario, run_campaign
-from suave_des.records.missions import missions_in
-from suave_des.results import style
-from suave_des.results.assisted import (
+from suave_des.reality.assisted import (
     EACH_OF_TWO,
     LEAST_TO_WEIGH,
     UNLIKE,
@@ -34,6 +32,8 @@ from suave_des.results.assisted import (
     compare_assisted,
     spread_of,
 )
+from suave_des.records.missions import missions_in
+from suave_des.results import style
 from suave_des.results.groups import grouped
 
 SCENARIO = "planta_exp1"
@@ -280,7 +280,7 @@ def sampled(
 
 
 def intervals(of: Sampled, spread: Array | float | None) -> tuple[Array, Array, Array]:
-    """Return mean, half-width and weight of each sample as results.assisted.assisted_mean estimates
+    """Return mean, half-width and weight of each sample as reality.assisted.assisted_mean estimates
     them, but for all samples at once; a test compares the two.
     """
     samples, conditions = of.real.shape

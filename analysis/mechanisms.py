@@ -24,7 +24,7 @@ import studies
 from calibration.cases import Case, Problem, read_cases
 from calibration.loss import compare, simulate_case
 from suave_des import validate, with_values
-from suave_des.results.validation import COMPARED, compare_conditions, over_conditions
+from suave_des.reality.validation import COMPARED, compare_conditions, over_conditions
 
 SHARE_2025 = 10
 """Missions for each manager of 2023 to one for each manager and condition of 2025."""

@@ -18,9 +18,9 @@ if _os.name == "nt":
 if _TYPE_CHECKING:
     from suave_des.api import RecordedMission, resume_campaign, run_campaign, run_mission
     from suave_des.campaign.campaign import train
-    from suave_des.campaign.variation import read_ensemble
     from suave_des.errors import InputError, MissionError, SuaveDesError
     from suave_des.estimates import mean_of
+    from suave_des.frame import CampaignFrame
     from suave_des.interfaces.gym import PipelineInspection
     from suave_des.interfaces.trees import PyTreesManager
     from suave_des.kb.knowledge_base import KnowledgeBase
@@ -29,12 +29,13 @@ if _TYPE_CHECKING:
     from suave_des.managing.metacontrol import Metacontrol
     from suave_des.managing.simple import NoManager, Threshold
     from suave_des.monitor.diagnostics import FAILED, Kind
+    from suave_des.reality.missions import read_real
+    from suave_des.reality.validation import compare_with_paper, validate
     from suave_des.records.runs import read_runs
     from suave_des.resources import find
-    from suave_des.results.compare import CampaignFrame, compare_folders
+    from suave_des.results.compare import compare_folders
     from suave_des.results.figures import draw_folder
-    from suave_des.results.real import read_real
-    from suave_des.results.validation import compare_with_paper, validate
+    from suave_des.scenario.ensemble import read_ensemble
     from suave_des.scenario.loader import load_scenario, with_values
     from suave_des.simulation.mission import Mission
     from suave_des.simulation.simulator import Simulator
@@ -68,9 +69,10 @@ _HOMES = {
     for module, names in {
         "api": ("RecordedMission", "resume_campaign", "run_campaign", "run_mission"),
         "campaign.campaign": ("train",),
-        "campaign.variation": ("read_ensemble",),
+        "scenario.ensemble": ("read_ensemble",),
         "errors": ("InputError", "MissionError", "SuaveDesError"),
         "estimates": ("mean_of",),
+        "frame": ("CampaignFrame",),
         "interfaces.gym": ("PipelineInspection",),
         "interfaces.trees": ("PyTreesManager",),
         "kb.knowledge_base": ("KnowledgeBase",),
@@ -81,10 +83,10 @@ _HOMES = {
         "monitor.diagnostics": ("FAILED", "Kind"),
         "records.runs": ("read_runs",),
         "resources": ("find",),
-        "results.compare": ("CampaignFrame", "compare_folders"),
+        "results.compare": ("compare_folders",),
         "results.figures": ("draw_folder",),
-        "results.real": ("read_real",),
-        "results.validation": ("compare_with_paper", "validate"),
+        "reality.missions": ("read_real",),
+        "reality.validation": ("compare_with_paper", "validate"),
         "scenario.loader": ("load_scenario", "with_values"),
         "simulation.mission": ("Mission",),
         "simulation.simulator": ("Simulator",),

@@ -30,7 +30,7 @@ from suave_des.simulation.inputs import check_inputs
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from suave_des.results.compare import CampaignFrame
+    from suave_des.frame import CampaignFrame
 
 
 _CALLER = 4
@@ -228,7 +228,7 @@ def _frame_of(
     """Run a campaign and show its progress; return its rows, with what else there is to know in
     attrs.
     """
-    from suave_des.results.compare import CampaignFrame
+    from suave_des.frame import CampaignFrame
 
     label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)
     interrupted = False

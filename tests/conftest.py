@@ -21,6 +21,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from benchmarks import chaos
 from suave_des.caches import private_cache
 from suave_des.resources import find
 from tests.helpers.command import command
@@ -134,6 +135,14 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path
         return path
 
     return write_file
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    """A scenario of short missions."""
+    path = tmp_path / "short.yaml"
+    path.write_text(chaos.SHORT)
+    return path
 
 
 @pytest.fixture(scope="session")

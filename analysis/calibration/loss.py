@@ -22,8 +22,9 @@ from scipy.stats import bootstrap
 
 from calibration.cases import Case, Problem
 from suave_des import Simulator, with_values
-from suave_des.results.real import CONDITION, count
-from suave_des.results.validation import balanced, compare_conditions
+from suave_des.reality.missions import count
+from suave_des.reality.validation import balanced, compare_conditions
+from suave_des.records.runs import CONDITION
 
 Vectors = NDArray[np.float64]
 """Missions as scaled vectors, shape (n, 2 or 3); unknown components are nan."""

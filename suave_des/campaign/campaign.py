@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -327,7 +328,9 @@ def _checked(
 def _connected(scheduler: str) -> AbstractContextManager[Executor]:
     """Connect to a Dask cluster; an InputError without Dask."""
     try:
-        from suave_des.campaign.cluster import connected
+        connected: Callable[[str], AbstractContextManager[Executor]] = import_module(
+            "suave_des.interfaces.cluster"  # an extra's, above this package
+        ).connected
     except ImportError as error:
         problem = f"a scheduler needs Dask, which is not installed ({error})"
         raise InputError(problem, remedy="pip install 'suave-des[dask]'") from None

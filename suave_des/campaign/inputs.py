@@ -11,12 +11,14 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from suave_des.campaign.ensembles import with_ensemble
 from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
-from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
+from suave_des.campaign.variation import check_drawn, vary
 from suave_des.errors import MISTAKES_LOGGER, InputError
 from suave_des.learned import read_file
 from suave_des.resources import shown_name
+from suave_des.scenario.ensemble import read_ensemble
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.inputs import check_inputs
 

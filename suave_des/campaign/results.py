@@ -13,8 +13,9 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+from suave_des.campaign.ensembles import ENSEMBLE_COLUMNS, differences
 from suave_des.campaign.missions import Campaign
-from suave_des.campaign.variation import ENSEMBLE_COLUMNS, Variation, cell_of, differences
+from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import known, mean_of, std_of
 from suave_des.files import FileContent, csv_pieces, csv_text
 from suave_des.records import store

@@ -1,9 +1,5 @@
 """Differences between a campaign's missions apart from manager and run: a sweep, each run's draws,
 and an ensemble.
-
-Unknown parameters of the real vehicle and its software are not noise, but the same in all its
-missions. So each run has one member of an ensemble, the same under all managers, and a difference
-between these can be analysed by member.
 """
 
 from __future__ import annotations
@@ -12,34 +8,21 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, groupby, islice, product
+from itertools import islice
 from pathlib import Path
-from statistics import fmean, stdev
 from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from suave_des.arguments import plain_arguments
-from suave_des.errors import InputError, line_error, located, number_of, shown
-from suave_des.estimates import known, mean_of, t_quantile
-from suave_des.files import as_number, read_csv
+from suave_des.errors import InputError, located, shown
 from suave_des.metrics.result import MissionResult
-from suave_des.records.metrics import Row
-from suave_des.records.store import MissionKey
-from suave_des.resources import find
+from suave_des.scenario.ensemble import Ensemble
 from suave_des.scenario.loader import LoadedScenario, full_path, value_at, with_values
 from suave_des.scenario.models import MissionSettings, Strict, wrong
 from suave_des.scenario.yamlfile import problem_and_remedy
 
 ENSEMBLE_COLUMN = "ensemble_member"
 """Column of runs.csv: number of the member, from 1."""
-ENSEMBLE_COLUMNS = (
-    *("first", "second", "metric", "n", "difference", "ci95_low", "ci95_high"),
-    *("members", "members_above_0", "members_below_0", "range95_low", "range95_high"),
-)
-"""Columns of ensemble.csv before those of swept parameters."""
-_NO_PARAMETERS = ("member", "loss")
-_ENSEMBLE_LIMIT_BYTES = 5_000_000
 _CHECKED_POINTS = 300
 """Of sweeps with more values, so many are checked before anything runs."""
 
@@ -125,25 +108,6 @@ def cell_of(value: Any) -> str | int | float | bool | None:
     if value is None or isinstance(value, str | int | float | bool):
         return value
     return json.dumps(value)
-
-
-@dataclass(frozen=True)
-class Ensemble:
-    """Parameter sets that fit real missions equally well: for each member the values at the key
-    paths of scenarios.
-    """
-
-    name: str
-    paths: tuple[str, ...]
-    members: tuple[tuple[float, ...], ...]
-
-    def member(self, run: int) -> int:
-        """Return the number, from 1, of the member that a run uses: they are used in turn."""
-        return (run - 1) % len(self.members) + 1
-
-    def values(self, member: int) -> dict[str, float]:
-        """Return a member's values by key path."""
-        return dict(zip(self.paths, self.members[member - 1], strict=True))
 
 
 @dataclass(frozen=True)
@@ -302,126 +266,3 @@ def short_mission(loaded: LoadedScenario) -> MissionResult:
 
     short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
     return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
-
-
-# Ensembles.
-
-
-@plain_arguments
-def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
-    """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
-
-    Args:
-        name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key
-            paths of the scenario; columns `member` and `loss` are only for information.
-
-    Returns:
-        The ensemble, its path, and the SHA-256 of the file.
-
-    Raises:
-        InputError: with file and line: it cannot be read, has fewer than two members, or something
-            else than numbers.
-    """
-    path = find(name, "scenarios/ensembles")
-    header, rows, digest = read_csv(path, _ENSEMBLE_LIMIT_BYTES, "a row for each member")
-    paths = tuple(name for name in header if name not in _NO_PARAMETERS)
-    if not paths or not all(header) or len(set(header)) < len(header):
-        raise line_error(
-            path,
-            1,
-            "has no column for each parameter",
-            "name each once, by its key path in the scenario",
-        )
-    members = []
-    for line, row in rows:
-        numbers = {name: as_number(cell) for name, cell in zip(header, row, strict=False)}
-        member = tuple(numbers.get(name, math.nan) for name in paths)
-        if len(row) != len(header) or not all(map(math.isfinite, member)):
-            problem = f"expected {len(header)} numbers, got {', '.join(row)}"
-            raise line_error(path, line, problem, "give each column one")
-        members.append(member)
-    if len(members) < 2:
-        raise line_error(
-            path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more"
-        )
-    return Ensemble(path.stem, paths, tuple(members)), path, digest
-
-
-def with_ensemble(
-    loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path
-) -> Variation:
-    """Return a variation with an ensemble, which was read from a path.
-
-    Raises:
-        InputError: a parameter is not a number of this scenario, a member's values are not allowed
-            in it, or it is swept or perturbed, too.
-    """
-    for name in ensemble.paths:
-        for other in {*variation.drawn, *variation.paths.values()}:
-            # one is below the other
-            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(f"{name}."):
-                problem = f"varies {name}, as the campaign's sweep or perturbations do"
-                raise InputError(problem, file=path, remedy="vary each key once")
-    found = replace(variation, ensemble=ensemble)
-    for member in range(1, len(ensemble.members) + 1):
-        with located(f"member {member} does not fit scenario {loaded.scenario.name}: ", path):
-            found.scenario(loaded, 0, member)
-    return found
-
-
-def differences(
-    variation: Variation,
-    rows: Iterable[tuple[MissionKey, Row]],
-    managers: Sequence[str],
-    metrics: Mapping[str, int],
-) -> Iterator[dict[str, Any]]:
-    """Yield the difference of each pair of managers in each metric, point by point: columns of
-    ensemble.csv.
-
-    The difference is paired by run, over the runs that both have. Its 95% interval is by Student's
-    t over independent draws, for chance alone. The range in which the differences of 95 in 100
-    parameter sets lie is the prediction interval for a further set: the mean ± Student's t times
-    the standard deviation of the members' means, times the root of 1 + 1 / their number. The few
-    runs of each member make it wider than the parameters do; with more of them it becomes narrower,
-    down to that.
-
-    Args:
-        rows: of runs.csv, ordered by their keys.
-        metrics: place in a row, by column.
-    """
-    assert variation.ensemble is not None
-    for point, group in groupby(rows, key=lambda each: each[0].point):
-        by_manager: dict[int, dict[int, Sequence[Any]]] = {}
-        for key, row in group:
-            by_manager.setdefault(key.manager, {})[key.run] = row
-        for (metric, place), (second, first) in product(
-            metrics.items(), combinations(sorted(by_manager), 2)
-        ):
-            ours = by_manager[first]
-            theirs = by_manager[second]
-            by_run = {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}
-            if by_run:
-                names = (managers[first], managers[second], metric)
-                cells = (*names, *_difference(variation, variation.ensemble, by_run))
-                yield {**dict(zip(ENSEMBLE_COLUMNS, cells, strict=True)), "point": point}
-
-
-def _difference(
-    variation: Variation, ensemble: Ensemble, by_run: Mapping[int, float]
-) -> tuple[Any, ...]:
-    """Describe the differences of runs, by chance and over parameter sets: cells of ensemble.csv."""
-    by_member: dict[int, list[float]] = {}
-    for run, value in by_run.items():
-        by_member.setdefault(ensemble.member(run), []).append(value)
-    draws = [(run - 1) // variation.runs_sharing_draw for run in by_run]
-    by_chance = mean_of(list(by_run.values()), draws)
-    mean = fmean(by_run.values())
-    means = list(map(fmean, by_member.values()))
-    half = math.nan
-    if len(means) > 1:
-        half = t_quantile(len(means) - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / len(means))
-    return (
-        *(len(by_run), mean, known(by_chance.low), known(by_chance.high)),
-        *(len(means), sum(each > 0.0 for each in means), sum(each < 0.0 for each in means)),
-        *(known(mean - half), known(mean + half)),
-    )

@@ -256,9 +256,9 @@ def reproduce(
     Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside the simulated results.
     """
     from suave_des.campaign.campaign import run_campaign
+    from suave_des.reality.validation import PAPER_FILE, compare_with_paper
     from suave_des.records.metrics import PAPER_METRICS
     from suave_des.records.missions import PAPER_ORDER
-    from suave_des.results.validation import PAPER_FILE, compare_with_paper
 
     if "out" in options:
         check_beside(options["out"], [PAPER_FILE])

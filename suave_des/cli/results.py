@@ -42,10 +42,10 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
+    from suave_des.reality.validation import Validation
     from suave_des.records.mission_folder import MissionRecord
     from suave_des.records.runs import Runs
     from suave_des.results.mission import Rules
-    from suave_des.results.validation import Validation
     from suave_des.tables import Written
 
 
@@ -135,8 +135,8 @@ def compare(
     Runs that share their random numbers are compared in pairs, which takes fewer missions. A few
     real missions can be assisted by simulated ones.
     """
+    from suave_des.reality.assisted import compare_assisted
     from suave_des.records.missions import read_missions
-    from suave_des.results.assisted import compare_assisted
     from suave_des.results.compare import compare_groups
     from suave_des.results.groups import grouped
 
@@ -164,11 +164,11 @@ def compare(
         for folder in (assisted_by, population)
         if folder is not None
     ]
-    groups = grouped(missions, names, columns, points, simulated=simulated)
     comparison: Written
     if simulated:
-        comparison = compare_assisted(groups)
+        comparison = compare_assisted(missions, simulated, names, columns)
     else:
+        groups = grouped(missions, names, columns, points)
         with counted("comparing", errors()) as show:
             comparison = compare_groups(
                 groups,
@@ -241,7 +241,7 @@ def validate(
     With a campaign file that sweeps the conditions of the real missions, each is compared under its
     own condition.
     """
-    from suave_des.results.real import (
+    from suave_des.reality.missions import (
         PAPERS_RUNS,
         numbered,
         published_for,
@@ -250,7 +250,7 @@ def validate(
         runs_in_a_row,
         targets_of,
     )
-    from suave_des.results.validation import validate as compare
+    from suave_des.reality.validation import validate as compare
 
     name = scenario or DEFAULT_SCENARIO
     seed = options.get("seed", 1)

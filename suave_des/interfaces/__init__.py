@@ -1,3 +1,3 @@
 """Missions and managers for other programs: step by step, as a Gymnasium environment, over HTTP, in
-other languages.
+other languages; and campaigns on a cluster.
 """

@@ -53,6 +53,10 @@ TIME_LIMIT = "time_limit_s"
 """Column of frames whose file has it, and of the exemplar's file of 2023."""
 MISSION = "mission"
 """Column of frames of the exemplar's files: its name of the mission, such as "suave_extended"."""
+CONDITION = "condition"
+"""Column of a frame of real missions: number of the condition, from 1."""
+NUMBER_COLUMNS = (CONDITION, "block")
+"""Columns of data files that may have that number."""
 _DURATION = "mission_duration_s"
 _POSITION = "initial pos (x,y)"
 _START = ("initial_x_m", "initial_y_m")

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypedDict, Unpack
+from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 import pandas
@@ -24,18 +24,14 @@ from suave_des.errors import InputError, shown, unknown
 from suave_des.estimates import Estimate, known, share_of
 from suave_des.files import as_number
 from suave_des.records.metrics import FOUND, SEARCH_TIME, Metric
-from suave_des.records.missions import SHARING, Missions, Source, missions_in
+from suave_des.records.missions import Missions, missions_in
+from suave_des.records.runs import CONDITION
 from suave_des.results import statistics
-from suave_des.results.assisted import AssistedComparison, compare_assisted
 from suave_des.results.comparison import Comparison, concluded
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
-from suave_des.results.real import CONDITION
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class Choices(TypedDict, total=False):
@@ -72,96 +68,17 @@ def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> 
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
     """
-    return _compared(missions_in(paths), **choices)
+    return compare_missions(missions_in(paths), **choices)
 
 
-class CampaignFrame(pandas.DataFrame):
-    """Missions, a row for each, with the columns of runs.csv.
-
-    What pandas makes of it, such as a selection of rows, can be compared and drawn, too.
-
-    Example:
-        frame = run_campaign("seams2023", ["none", "bt", "metacontrol"], runs=100)
-        print(frame.compare().conclusion)
-        frame[frame["run"] <= 50].compare(metrics=["distance_inspected_m"], against="none")
-        frame.figure().savefig("distributions.pdf")
-    """
-
-    @property
-    def _constructor(self) -> type[CampaignFrame]:
-        return CampaignFrame
-
-    def __finalize__(self, other: Any, method: str | None = None, **keywords: Any) -> Self:
-        """Keep how many runs share a draw where frames are joined: pandas keeps attrs only if all
-        are equal.
-        """
-        found: Self = super().__finalize__(other, method, **keywords)  # type: ignore[misc]
-        parts: Iterable[Any] = (
-            getattr(other, "objs", getattr(other, "input_objs", ())) if method == "concat" else ()
-        )
-        known = {part.attrs[SHARING] for part in parts if SHARING in part.attrs}
-        if known:
-            found.attrs[SHARING] = math.lcm(*known)
-        return found
-
-    @plain_arguments
-    def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
-        """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by
-        cell.
-
-        Args:
-            choices: what to compare, and how; see Choices.
-
-        Raises:
-            InputError: a name is not there, or an extra is not installed.
-        """
-        return _compared(missions_in(self), **choices)
-
-    def assist(
-        self,
-        real: Source,
-        population: Source,
-        managers: Sequence[str] = (),
-        metrics: Sequence[str] = (),
-    ) -> AssistedComparison:
-        """Estimate what real missions show, assisted by these, which are of the same conditions.
-
-        Args:
-            real: real missions in a few conditions, as a data frame or as folders and files;
-                likewise population.
-            population: a campaign under many conditions.
-            managers: names; empty: all that have real missions.
-            metrics: columns of runs.csv; empty: the usual ones.
-
-        Raises:
-            InputError: the missions do not belong together, or are too few.
-        """
-        simulated = missions_in(self), missions_in(population)
-        return compare_assisted(grouped(missions_in(real), managers, metrics, simulated=simulated))
-
-    @plain_arguments
-    def figure(self, kind: str = "auto") -> Figure:
-        """Draw the missions, as `suave-des figure` does.
-
-        Args:
-            kind: as of `suave-des figure --kind`; "auto": means over what was swept, or
-                distributions.
-
-        Raises:
-            InputError: there is no such kind of figure.
-        """
-        from suave_des.results.figures import draw_missions
-
-        return draw_missions(missions_in(self), kind)
-
-
-def _compared(
+def compare_missions(
     missions: Missions,
     managers: Sequence[str] = (),
     metrics: Sequence[str] = (),
     by: Sequence[str] = (),
     **how: Any,
 ) -> Comparison:
+    """Compare missions; see compare_folders."""
     return compare_groups(grouped(missions, managers, metrics, by), **how)
 
 

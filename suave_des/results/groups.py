@@ -23,16 +23,14 @@ from suave_des.records.metrics import (
     metric_of,
 )
 from suave_des.records.missions import SHARING, Missions
-from suave_des.records.runs import check_one_mission
+from suave_des.records.runs import CONDITION, NUMBER_COLUMNS
 from suave_des.results.horizon import (
     ENDED,
     FOUND_BY_HORIZON,
     HORIZON,
     SAME_LIMIT_S,
     at_horizons,
-    to_horizon,
 )
-from suave_des.results.real import CONDITION, NUMBER_COLUMNS, common_limit_s, matched
 
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
@@ -41,8 +39,6 @@ _MEMBER = "ensemble_member"
 _CLUSTER = "condition of real missions"
 """Column with the numbers of conditions, none where missions are taken as independent."""
 _FEW = 20
-_PLACES = ("real missions", "assisted by", "population")
-"""Of errors in real missions and those that assist them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +86,9 @@ class Groups:
         notes: what a reader should know about the groups.
         counted: what the rows of groups are: "mission", "run", "draw", "condition", or "value"
             where they differ.
-        time_limit_s: the shortest horizon of a group. Of real missions that simulated ones assist,
-            the limit of all; infinite if it is not known.
+        time_limit_s: the shortest horizon of a group; infinite if it is not known.
         lost: by name of a group that did not find the pipeline in most of its missions, in how
             many.
-        sides: real missions and those simulated under the same conditions, with the numbers of
-            these, and those simulated under many, with the numbers of their draws; empty if no
-            simulated ones assist them.
     """
 
     missions: Missions
@@ -106,7 +98,6 @@ class Groups:
     counted: str
     time_limit_s: float
     lost: Mapping[str, str]
-    sides: tuple[pandas.DataFrame, ...] = ()
 
 
 def grouped(
@@ -116,79 +107,62 @@ def grouped(
     by: Sequence[str] = (),
     *,
     averages: bool = True,
-    simulated: Sequence[Missions] = (),
 ) -> Groups:
     """Group missions by manager, source and the chosen parameters of a sweep.
 
     Args:
         missions: of all sources.
         managers: names of those to include; empty: all.
-        metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has;
-            with simulated missions, those of the paper.
+        metrics: columns of runs.csv; empty: those of the usual ones that at least one mission has.
         by: swept parameters each of whose values is a separate group.
         averages: whether a run's values are averaged over the other swept parameters.
-        simulated: what assists real missions: a campaign that sweeps their conditions, and one
-            under many, drawn as theirs were. Conditions follow from columns named like what is
-            swept, a column `condition` with numbers from 1, or the order.
 
     Raises:
-        InputError: a name is not there, no mission has a metric, or there are too many groups; or
-            simulated missions lack a manager or a metric, have a number that is none or another
-            time limit, or are of other conditions.
+        InputError: a name is not there, no mission has a metric, or there are too many groups.
     """
     check_swept(missions, by, "by")
     managers = [missions.labels.get(name, name) for name in managers]
-    frame = _of_managers(missions, managers, simulated)
-    if simulated:
-        return _assisted(missions, frame, managers, metrics, simulated)
-    frame = at_horizons(frame, missions.swept, by)
+    frame = at_horizons(of_managers(missions, managers), missions.swept, by)
     averaged = [name for name in missions.swept if averages and name not in by]
     alike = alike_by_source(frame) if averages else {}
     if averages:
         frame = frame.assign(**{_CLUSTER: _conditions(frame, missions.swept)})
     groups = []
     lacking: dict[str, list[str]] = defaultdict(list)
-    for part, name, point in _parts(frame, managers, by):
+    for part, name, point in parts(frame, managers, by):
         found = independent(part, _same_points(frame, part, by), averaged, alike)
         for what, how_many in found.left_out.items():
             lacking[what].append(f"{name} {how_many}")
         horizon_s = float(part[HORIZON].iloc[0])
         groups.append(Group(name, _by_run(found.rows), found.counted, point, horizon_s))
     on_points = list(_notes_on_points(groups, averaged, frame, lacking))
-    chosen = _chosen_metrics(metrics, groups)
+    chosen = chosen_metrics(metrics, groups)
     notes = [
-        *_notes(groups, averaged, frame, alike),
+        *notes_on_missions(groups, averaged, frame, alike),
         *on_points,
-        *_notes_on_metrics(groups, chosen),
+        *notes_on_metrics(groups, chosen),
     ]
     limit_s = min(group.horizon_s for group in groups)
     lost = dict(_mostly_lost(groups))
     return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost)
 
 
-def _of_managers(
-    missions: Missions, managers: Sequence[str], simulated: Sequence[Missions]
-) -> pandas.DataFrame:
+def of_managers(missions: Missions, managers: Sequence[str]) -> pandas.DataFrame:
     """Return the missions of the managers named, or of all.
 
     Raises:
-        InputError: there is none of one of them, or of one that simulated missions are to assist.
+        InputError: there is none of one of them.
     """
     known = list(dict.fromkeys(missions.frame["manager"]))
     for name in managers:
         if name not in known:
             raise unknown(f"there is no mission of {shown(name)}", name, known, "there are")
-    for place, others in zip(_PLACES[1:], simulated, strict=False):
-        theirs = dict.fromkeys(others.frame["manager"])
-        for name in managers or known:
-            if name not in theirs:
-                raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
     is_wanted = missions.frame["manager"].isin(list(managers) or known)
     return missions.frame.loc[is_wanted]
 
 
-def _parts(
-    frame: pandas.DataFrame, managers: Sequence[str], by: Sequence[str]
+def parts(
+    frame: pandas.DataFrame, managers: Sequence[str], by: Sequence[str] = ()
 ) -> list[tuple[pandas.DataFrame, str, str]]:
     """Return the missions of each group with the name of the group, and the end of it that tells
     the values of a sweep.
@@ -236,43 +210,6 @@ def _are_at_other_points(frame: pandas.DataFrame, averaged: Sequence[str]) -> bo
         for _, part in frame.groupby("source", observed=True)
     }
     return len(of_sources) > 1
-
-
-def _assisted(
-    missions: Missions,
-    frame: pandas.DataFrame,
-    managers: Sequence[str],
-    metrics: Sequence[str],
-    simulated: Sequence[Missions],
-) -> Groups:
-    """Group real missions by manager, with those that assist them."""
-    same, population = simulated
-    frame = frame.assign(source="")
-    check_one_mission(frame, _PLACES[0])
-    if population.swept:
-        problem = (
-            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
-        )
-        remedy = "draw the conditions, as perturbations"
-        raise InputError(problem, place="population", remedy=remedy)
-    chosen = _chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
-    sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
-    _check_numbers(sides, chosen)
-    limit_s = common_limit_s(sides)
-    if math.isfinite(limit_s):
-        sides = {place: to_horizon(each, limit_s) for place, each in sides.items()}
-    else:
-        sides[_PLACES[0]] = at_horizons(frame, ())
-    real, in_same, drawn = sides.values()
-    matching = matched(real, in_same, drawn, same.swept)
-    groups = [
-        Group(name, _by_run(part), horizon_s=limit_s)
-        for part, name, _ in _parts(real, managers, ())
-    ]
-    notes = [*same.notes, *population.notes, *_notes(groups, (), frame, {})]
-    notes += _notes_on_metrics(groups, chosen)
-    lost = dict(_mostly_lost(groups))
-    return Groups(missions, groups, chosen, tuple(notes), _counted(groups), limit_s, lost, matching)
 
 
 def least_and_greatest(
@@ -331,7 +268,7 @@ def _texts_of_values(values: Iterable[object]) -> Callable[[object], str]:
     return text
 
 
-def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
+def chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
     """Return the metrics named, or those of the usual ones that at least one mission has."""
     found = []
     for name in dict.fromkeys(wanted or _USUAL):
@@ -352,17 +289,6 @@ def _chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Met
 def _counted(groups: Sequence[Group]) -> str:
     kinds = {group.counted for group in groups}
     return kinds.pop() if len(kinds) == 1 else "value"
-
-
-def _check_numbers(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
-    """Check that real missions and those that assist them have the numbers that are compared."""
-    for place, frame in sides.items():
-        for metric in metrics:
-            values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
-            may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
-            if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
-                problem = f"{metric.name} has a value that is no number, or no value at all"
-                raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
 
 
 # Runs that share their draws
@@ -495,12 +421,13 @@ def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.
 # What a reader should know
 
 
-def _notes(
+def notes_on_missions(
     groups: Sequence[Group],
     averaged: Sequence[str],
     frame: pandas.DataFrame,
     alike_by_source: Mapping[str, int],
 ) -> Iterator[str]:
+    """Say what missions, averages and parameters the numbers are of, and how rough they are."""
     yield from _notes_on_averages(groups, averaged, frame, alike_by_source)
     members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
     if members > 1:
@@ -603,7 +530,8 @@ def _notes_on_points(
         yield f"each campaign has means over other points of the sweep: compare by {', '.join(averaged)}"
 
 
-def _notes_on_metrics(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]:
+def notes_on_metrics(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]:
+    """Say which missions lack a value of a metric, or count with the horizon."""
     for metric in metrics:
         if metric.name == SEARCH_TIME:
             yield from _never_found(groups)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas
 import pytest
 
-from suave_des.results.assisted import Chance, assisted_mean
+from suave_des.reality.assisted import Chance, assisted_mean
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "analysis"

@@ -11,16 +11,12 @@ import pytest
 from scipy import stats
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.variation import (
-    ENSEMBLE_COLUMN,
-    Ensemble,
-    Variation,
-    differences,
-    read_ensemble,
-)
+from suave_des.campaign.ensembles import differences
+from suave_des.campaign.variation import ENSEMBLE_COLUMN, Variation
 from suave_des.errors import InputError
 from suave_des.records.store import MissionKey
 from suave_des.resources import shipped_folder
+from suave_des.scenario.ensemble import Ensemble, read_ensemble
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 

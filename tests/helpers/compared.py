@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas
 
-from suave_des.results.compare import CampaignFrame
+from suave_des.frame import CampaignFrame
 from suave_des.results.comparison import Comparison
 from suave_des.tables import rows_of
 

@@ -12,16 +12,16 @@ from scipy import stats
 
 from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
-from suave_des.records.runs import read_runs
-from suave_des.resources import shipped_folder
-from suave_des.results.real import Share, Targets, conditions_of, count, numbered, read_real
-from suave_des.results.validation import (
+from suave_des.reality.missions import Share, Targets, conditions_of, count, numbered, read_real
+from suave_des.reality.validation import (
     balanced,
     compare_conditions,
     compare_shares,
     over_conditions,
     validate,
 )
+from suave_des.records.runs import read_runs
+from suave_des.resources import shipped_folder
 from suave_des.scenario.yamlfile import read_yaml, validated
 
 OWN = "manager,search_time_s,distance_inspected_m"

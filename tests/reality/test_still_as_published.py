@@ -14,10 +14,10 @@ import pytest
 from scipy.stats import ks_2samp
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.reality.validation import compare_with_paper
 from suave_des.records.metrics import PAPER_METRICS
 from suave_des.records.runs import read_runs
 from suave_des.resources import find, shipped_folder
-from suave_des.results.validation import compare_with_paper
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from suave_des.campaign import cluster
 from suave_des.campaign.inputs import read_campaign
 from suave_des.campaign.missions import Campaign, Finished
 from suave_des.campaign.spec import CampaignSpec
+from suave_des.interfaces import cluster
 from suave_des.records.store import MissionFailure, MissionKey
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.user_code import user_modules

@@ -14,9 +14,9 @@ from scipy.stats import t
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
+from suave_des.reality.assisted import AssistedComparison, Chance, assisted_mean, compare_assisted
+from suave_des.reality.missions import matched
 from suave_des.records.missions import missions_in
-from suave_des.results.assisted import AssistedComparison, Chance, assisted_mean, compare_assisted
-from suave_des.results.groups import grouped
 from tests.helpers.command import command_here
 
 REAL = Path(__file__).parents[2] / "scenarios" / "published" / "planta_exp1_runs.csv"
@@ -77,7 +77,7 @@ def compared(**changed: pandas.DataFrame) -> AssistedComparison:
         "population": population(),
     } | changed
     real, *simulated = map(missions_in, given.values())
-    return compare_assisted(grouped(real, simulated=simulated))
+    return compare_assisted(real, simulated)
 
 
 # The estimator
@@ -279,12 +279,9 @@ def test_a_difference_allows_for_unlike_conditions_also_if_the_simulation_never_
 def test_a_share_has_an_interval_for_shares():
     points = np.linspace(1.05, 2.95, 30)
     real, same = real_missions(1, 5.0, points), missions(2, points, 5)
-    groups = grouped(
-        missions_in(real),
-        metrics=["pipeline_found"],
-        simulated=[missions_in(same), missions_in(population())],
-    )
-    row = compare_assisted(groups).estimates.iloc[0]
+    simulated = [missions_in(same), missions_in(population())]
+    found = compare_assisted(missions_in(real), simulated, metrics=["pipeline_found"])
+    row = found.estimates.iloc[0]
     # 30 of 30 by Wilson: n / (n + 1.96^2).
     assert row["assisted_ci95_low"] == pytest.approx(30 / (30 + 1.959964**2), abs=1e-6)
     assert row["conclusion"].endswith("; simulated missions do not assist shares.")
@@ -298,7 +295,7 @@ def test_a_manager_without_a_metric_is_left_out_of_it():
         )
     real, *simulated = map(missions_in, sides)
     metrics = ["search_time_s", "mean_reaction_time_s"]
-    found = compare_assisted(grouped(real, metrics=metrics, simulated=simulated))
+    found = compare_assisted(real, simulated, metrics=metrics)
     reactions = found.estimates.query("metric == 'mean_reaction_time_s'")
     assert reactions["group"].tolist() == ["a"]
     assert found.notes[-1] == "b is left out of mean reaction time, of which it has no value"
@@ -429,10 +426,9 @@ def test_real_missions_without_those_of_a_condition_are_not_assigned_by_their_or
 def test_runs_with_the_same_values_are_one_draw_also_without_a_manifest():
     frame = population(draws=50)
     four = pandas.concat([frame.assign(run=4 * (frame["run"] - 1) + each) for each in (1, 2, 3, 4)])
-    real, same = missions_in(real_missions(2)), missions_in(missions(2, POINTS, 5))
+    real, same = real_missions(2), missions(2, POINTS, 5)
     counts = [
-        grouped(real, simulated=[same, missions_in(each)]).sides[2]["draw"].nunique()
-        for each in (frame, four)
+        matched(real, same, each, ["start.y_m"])[2]["draw"].nunique() for each in (frame, four)
     ]
     assert counts == [50, 50]
 

@@ -19,10 +19,10 @@ import pytest
 
 import suave_des
 from benchmarks import chaos
-from suave_des.campaign import cluster as dask_cluster
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.missions import WorkerError
 from suave_des.errors import InputError
+from suave_des.interfaces import cluster as dask_cluster
 from suave_des.records.store import STORE_FILE
 from suave_des.resources import shipped_folder
 from tests.helpers import AWKWARD

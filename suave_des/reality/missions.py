@@ -27,7 +27,15 @@ from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, line_error, located, number_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, metric_of
-from suave_des.records.runs import COLUMNS, TIME_LIMIT, Runs, check_one_mission, read_runs
+from suave_des.records.runs import (
+    COLUMNS,
+    CONDITION,
+    NUMBER_COLUMNS,
+    TIME_LIMIT,
+    Runs,
+    check_one_mission,
+    read_runs,
+)
 from suave_des.resources import shipped_folder
 from suave_des.results.horizon import SAME_LIMIT_S
 from suave_des.scenario.loader import Replacements, load_scenario
@@ -36,10 +44,6 @@ from suave_des.scenario.yamlfile import read_yaml, validated
 
 PAPERS_RUNS = "seams2023_runs.csv"
 """The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""
-CONDITION = "condition"
-"""Column of a frame of missions: number of the condition, from 1."""
-NUMBER_COLUMNS = (CONDITION, "block")
-"""Columns of data files that may have that number."""
 _RELATIVE, _ABSOLUTE = 1e-3, 0.01
 """Data files give conditions rounded; values as near as this are the same."""
 _STARTS = {"start.x_m": "initial_x_m", "start.y_m": "initial_y_m"}

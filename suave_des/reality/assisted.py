@@ -9,7 +9,7 @@ far the simulation is off in others, so that intervals allow for that.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -17,14 +17,24 @@ from typing import Any
 import numpy as np
 import pandas
 
-from suave_des.errors import InputError, number_of
+from suave_des.errors import InputError, number_of, unknown
 from suave_des.estimates import CONFIDENCE, STUDENT, Estimate, std_of, t_quantile
-from suave_des.records.metrics import FOUND, Metric
+from suave_des.reality.missions import common_limit_s, matched
+from suave_des.records.metrics import FOUND, PAPER_METRICS, Metric
+from suave_des.records.missions import Missions
+from suave_des.records.runs import CONDITION, check_one_mission
 from suave_des.results import statistics
 from suave_des.results.comparison import Row, estimate_in
 from suave_des.results.conclusions import difference_claim
-from suave_des.results.groups import Groups
-from suave_des.results.real import CONDITION
+from suave_des.results.groups import (
+    Group,
+    chosen_metrics,
+    notes_on_metrics,
+    notes_on_missions,
+    of_managers,
+    parts,
+)
+from suave_des.results.horizon import at_horizons, to_horizon
 from suave_des.results.statistics import Sample
 from suave_des.tables import Section, Table, Written, capital, rows_of
 
@@ -41,6 +51,8 @@ intervals with it hold.
 EACH_OF_TWO = (1.0 + CONFIDENCE) / 2.0
 """Confidence of an interval of which the narrower of two is given (Bonferroni)."""
 _LEAST_SIMULATED, _LEAST_DRAWS = 2, 10
+_PLACES = ("real missions", "assisted by", "population")
+"""Of errors in real missions and those that assist them."""
 USEFUL = 0.5
 """With few conditions the simulation counts if what it leaves of their standard deviation is less."""
 _NOTICEABLE = 1.1
@@ -195,22 +207,83 @@ class AssistedComparison(Written):
         return [*how, *(f"Note: {note}." for note in self.notes)]
 
 
-def compare_assisted(real: Groups) -> AssistedComparison:
+def compare_assisted(
+    real: Missions,
+    simulated: Sequence[Missions],
+    managers: Sequence[str] = (),
+    metrics: Sequence[str] = (),
+) -> AssistedComparison:
     """Estimate each manager's means, and the differences between managers, from real missions and
     simulated ones.
 
     A mission that never found the pipeline counts with the time limit as its search time.
 
+    Args:
+        real: missions in a few conditions.
+        simulated: what assists them: a campaign that sweeps their conditions, and one under many,
+            drawn as theirs were. Conditions follow from columns named like what is swept, a column
+            `condition` with numbers from 1, or the order.
+        managers: names; empty: all that have real missions.
+        metrics: columns of runs.csv; empty: those of the paper.
+
     Raises:
-        InputError: the missions are too few.
+        InputError: a name is not there, missions lack a manager or a metric, have a number that is
+            none or another time limit, are of other conditions, or are too few.
     """
-    in_real, in_same, drawn = real.sides
+    same, population = simulated
+    managers = [real.labels.get(name, name) for name in managers]
+    frame = of_managers(real, managers).assign(source="")
+    for place, others in zip(_PLACES[1:], simulated, strict=True):
+        theirs = dict.fromkeys(others.frame["manager"])
+        for name in managers or frame["manager"].unique():
+            if name not in theirs:
+                raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
+    check_one_mission(frame, _PLACES[0])
+    if population.swept:
+        problem = (
+            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        )
+        remedy = "draw the conditions, as perturbations"
+        raise InputError(problem, place="population", remedy=remedy)
+    chosen = chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
+    sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
+    _check_values(sides, chosen)
+    limit_s = common_limit_s(sides)
+    if math.isfinite(limit_s):
+        sides = {place: to_horizon(each, limit_s) for place, each in sides.items()}
+    else:
+        sides[_PLACES[0]] = at_horizons(frame, ())
+    brought, in_same, drawn = sides.values()
+    matching = matched(brought, in_same, drawn, same.swept)
+    groups = [Group(name, part, horizon_s=limit_s) for part, name, _ in parts(brought, managers)]
+    notes = [*real.notes, *same.notes, *population.notes]
+    notes += [*notes_on_missions(groups, (), frame, {}), *notes_on_metrics(groups, chosen)]
+    rows, lacking = _estimates(matching, [group.name for group in groups], chosen)
+    return AssistedComparison(pandas.DataFrame(rows), (*notes, *lacking), chosen)
+
+
+def _check_values(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
+    """Check that real missions and those that assist them have the numbers that are compared."""
+    for place, frame in sides.items():
+        for metric in metrics:
+            values = frame.get(metric.name, pandas.Series([math.nan])).to_numpy(float)
+            may_lack = metric.name not in PAPER_METRICS and not np.isnan(values).all()
+            if np.isinf(values).any() or (np.isnan(values).any() and not may_lack):
+                problem = f"{metric.name} has a value that is no number, or no value at all"
+                raise InputError(problem, place=place, remedy="correct it, or leave the metric out")
+
+
+def _estimates(
+    sides: Sequence[pandas.DataFrame], managers: Sequence[str], metrics: Sequence[Metric]
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """Return the estimates of missions as `matched` returns them, and which managers they lack."""
+    in_real, in_same, drawn = sides
     rows = []
-    notes = [*real.missions.notes, *real.notes]
-    for metric in real.metrics:
+    notes = []
+    for metric in metrics:
         names = []
-        for name in dict.fromkeys(group.name for group in real.groups):
-            own = [each.loc[each["manager"] == name, metric.name] for each in real.sides]
+        for name in managers:
+            own = [each.loc[each["manager"] == name, metric.name] for each in sides]
             if all(each.notna().any() for each in own):
                 names.append(name)
             else:
@@ -221,7 +294,7 @@ def compare_assisted(real: Groups) -> AssistedComparison:
         shared = _shared(in_same, metric.name)
         for both in map(list, [*combinations(names, 1), *combinations(names, 2)]):
             rows.append(_estimate(both, metric, conditions, draws, shared))
-    return AssistedComparison(pandas.DataFrame(rows), tuple(notes), real.metrics)
+    return rows, notes
 
 
 def _means(frame: pandas.DataFrame, by: str, metric: str, name: str) -> pandas.DataFrame:

@@ -11,10 +11,10 @@ import pytest
 from scipy.stats import mannwhitneyu
 
 from analysis.split_check import split_check
+from suave_des.reality.missions import Share, Targets
+from suave_des.reality.validation import JSON_FILE, TABLES, compare_with_paper, validate
 from suave_des.records.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.results.real import Share, Targets
-from suave_des.results.validation import JSON_FILE, TABLES, compare_with_paper, validate
 from suave_des.scenario.yamlfile import read_yaml, validated
 
 pytestmark = pytest.mark.usefixtures("few_resamples")

@@ -28,6 +28,14 @@ from suave_des.estimates import (
     share_of,
     std_of,
 )
+from suave_des.reality.missions import (
+    PAPERS_RUNS,
+    ConditionLimits,
+    Region,
+    Share,
+    common_limit_s,
+    count,
+)
 from suave_des.records.metrics import (
     FOUND,
     METRICS,
@@ -36,19 +44,10 @@ from suave_des.records.metrics import (
     SEARCH_TIME,
 )
 from suave_des.records.missions import in_papers_order
-from suave_des.records.runs import read_runs
+from suave_des.records.runs import CONDITION, read_runs
 from suave_des.resources import find
 from suave_des.results import statistics
 from suave_des.results.comparison import Row
-from suave_des.results.real import (
-    CONDITION,
-    PAPERS_RUNS,
-    ConditionLimits,
-    Region,
-    Share,
-    common_limit_s,
-    count,
-)
 from suave_des.results.statistics import SIGNIFICANCE, Sample
 from suave_des.tables import Table, markdown_text, rows_of
 

@@ -7,14 +7,13 @@ import pandas
 import pytest
 from scipy import stats
 
-from suave_des.records.missions import missions_in
-from suave_des.results.assisted import (
+from suave_des.reality.assisted import (
     UNLIKE,
     AssistedComparison,
     assisted_mean,
     compare_assisted,
 )
-from suave_des.results.groups import grouped
+from suave_des.records.missions import missions_in
 
 
 def test_an_estimated_weight_takes_a_degree_of_freedom():
@@ -61,10 +60,8 @@ def assisted(metric: str, shift: int = 0) -> AssistedComparison:
     real = found_in(shares, 4, 1, shift).drop(columns=["run", "seed"])
     same = found_in({"a": [3, 4, 4, 4], "b": [1, 3, 1, 3]}, 4, 2, 0)
     many = drawn({"a": [1] * 9 + [0], "b": [1, 0] * 5}, 3.0)
-    groups = grouped(
-        missions_in(real), metrics=[metric], simulated=[missions_in(same), missions_in(many)]
-    )
-    return compare_assisted(groups)
+    simulated = [missions_in(same), missions_in(many)]
+    return compare_assisted(missions_in(real), simulated, metrics=[metric])
 
 
 def test_a_difference_of_shares_is_in_percentage_points_with_its_interval():
@@ -92,7 +89,7 @@ def test_real_missions_that_ended_early_count_with_the_limit():
     real.loc[4, "search_time_s"] = 20.0  # the battery was empty
     same = found_in({"a": [4, 1, 2]}, 4, 2, 0)
     many = drawn({"a": [1] * 9 + [0]}, 2.0)
-    groups = grouped(missions_in(real), simulated=[missions_in(same), missions_in(many)])
-    found = compare_assisted(groups).estimates.set_index(["metric", "group"])
+    simulated = [missions_in(same), missions_in(many)]
+    found = compare_assisted(missions_in(real), simulated).estimates.set_index(["metric", "group"])
     in_conditions = [100.0, 300.0, (102.0 + 300.0) / 2]
     assert found.loc[("search_time_s", "a"), "alone"] == pytest.approx(np.mean(in_conditions))

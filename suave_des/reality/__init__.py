@@ -1,0 +1,1 @@
+"""Real missions: what simulated ones are compared with, and what they assist."""
