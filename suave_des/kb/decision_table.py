@@ -195,8 +195,8 @@ class DecisionTable:
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
         """Look the decisions up: as many as are made at a time.
 
-        As in metacontrol, the state at the beginning says which functions are adapted, and the values
-        that are measured by now say to what.
+        As in metacontrol, the state at the beginning says which functions are adapted, and the
+        values that are measured by now say to what.
         """
         decisions = []
         changes = 0

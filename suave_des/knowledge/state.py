@@ -199,8 +199,8 @@ class Inference:
         facts: the inferred facts, none of which is asserted.
         objectives: name of a function's objective, by the function's name.
         groundings: name of a function design's grounding, by the design's name.
-        measured_since: values that were measured while the reasoner inferred, with which designs are
-            chosen; None: those of the state.
+        measured_since: values that were measured while the reasoner inferred, with which designs
+            are chosen; None: those of the state.
     """
 
     state: KnowledgeState

@@ -186,9 +186,9 @@ class ManagingSubsystem:
     event-triggered, and declares it by `depends_on`. It is not called at all of its times: after a
     call of `adapt` that returned None, or a generator that returned True (another call right then
     would change nothing), the next one is at the first of its times after a hook was called, or
-    such that a measured value has crossed a threshold before the call has read it. The mission is the same, with two exceptions: an event
-    at the very time of a call may come before it; and something may happen during a call that
-    changes nothing but takes time.
+    such that a measured value has crossed a threshold before the call has read it. The mission is
+    the same, with two exceptions: an event at the very time of a call may come before it; and
+    something may happen during a call that changes nothing but takes time.
 
     Example:
         >>> class HighInClearWater(ManagingSubsystem):

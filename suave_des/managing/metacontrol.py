@@ -2,8 +2,9 @@
 
 Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner
 infers what the rules say about that state, which takes a while. Plan: the best function design for
-each objective that needs one, by the values that are measured by then. Execute: request the mode of the design's name. Source of what revisions do differently:
-kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
+each objective that needs one, by the values that are measured by then. Execute: request the mode of
+the design's name. Source of what revisions do differently: kas-lab/suave with its reasoner,
+4 February 2023 to 1.5.0.
 """
 
 from collections.abc import Callable, Collection, Hashable
@@ -355,7 +356,8 @@ class Metacontrol(ManagingSubsystem):
         ends_s = began_s + self._latency_s(began_s)
         if not self.objectives or passed_s < 0.0 or env.now >= ends_s:
             return
-        reasoning, measured_before = self._analyze_and_plan(), self._measured_key()
+        reasoning = self._analyze_and_plan()
+        measured_before = self._measured_key()
 
         def execute() -> None:
             for decision in self._plan_by_now(reasoning, measured_before).decisions:
