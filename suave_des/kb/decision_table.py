@@ -215,10 +215,11 @@ class DecisionTable:
 
     def _decisions_by_now(self, inference: Inference) -> list[Decision]:
         decisions = list(self._decisions(inference.state))
-        if inference.measured_since is None or not self.settings.as_metacontrol:
+        state = inference.state
+        if state.measured_since is None or not self.settings.as_metacontrol:
             return decisions
         adapted = {each.function for each in decisions}
-        now = replace(inference.state, measurements=inference.measured_since)
+        now = replace(state, measurements=state.measured_since)
         return [each for each in self._decisions(now) if each.function in adapted]
 
     def _decisions(self, state: KnowledgeState) -> Iterator[Decision]:

@@ -426,7 +426,7 @@ def mission_states(
     regions = regions_of(base)
     kinds = {regions.key(record.state): record for record in reversed(mission.records)}
     return (
-        (record.t_s, record.state)
+        (record.t_s, replace(record.state, measured_since=None))
         for record in sorted(kinds.values(), key=lambda record: record.t_s)
     )
 

@@ -5,7 +5,7 @@ recorded mission's time.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -288,6 +288,7 @@ class StateBuilder:
     parts: dict[str, dict[str, object]] = field(
         default_factory=lambda: {kind: {} for kind in _NOUNS}
     )
+    measured_since: dict[str, Decimal] | None = None  # of a recorded state, until a value is given
 
     def add(self, kind: str, name: str, value: Any) -> None:
         """Add one part: one of the objectives, groundings, components or measurements.
@@ -302,6 +303,7 @@ class StateBuilder:
             )
         if kind == "measurements":
             _check_number(name, value)
+            self.measured_since = None
         elif isinstance(value, bool):  # YAML reads a bare FALSE as one
             value = str(value).upper()
         # Both raise an error if the value is no number, or no text.
@@ -423,6 +425,10 @@ class StateBuilder:
             for name, value in content.items():
                 if kind in ("objectives", "groundings") or name in self._known(kind):
                     self.add(kind, name, value)
+        if state.measured_since is not None:
+            known = self._known("measurements")
+            since = dict(state.measured_since)
+            self.measured_since = {name: since[name] for name in known if name in since}
 
     def state(self) -> KnowledgeState:
         """Build the state. Without objectives, it has those of the groundings, else those of the
@@ -430,7 +436,10 @@ class StateBuilder:
         """
         search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
         asked = self.parts["objectives"] or dict.fromkeys(self.parts["groundings"] or search)
-        return self.settings.state(**self.parts | {"objectives": asked})
+        state = self.settings.state(**self.parts | {"objectives": asked})
+        if self.measured_since is None:
+            return state
+        return replace(state, measured_since=tuple(sorted(self.measured_since.items())))
 
 
 def _check_number(name: str, value: object) -> None:

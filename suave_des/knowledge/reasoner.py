@@ -18,7 +18,7 @@ import re
 import resource
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cache, cached_property, lru_cache, partial
 from importlib.metadata import version
@@ -263,7 +263,7 @@ def _measured_since(
     """Say which of the values that designs expect have changed since the inference began."""
     before = dict(inference.state.measurements)
     expected = {name for design in designs for name in ontology.expected(design)}
-    for name, now in sorted(inference.measurements.items()):
+    for name, now in sorted(inference.state.planned_with().items()):
         if name in expected and now != before.get(name):
             then = _show(before[name]) if name in before else "unknown"
             yield f", with {name} {_show(now)} ({then} when inferred)"
@@ -287,7 +287,7 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
         for expected in _expected(inference, design, attribute):
             for left, sign, right in _worse(inference, attribute, expected, required):
                 yield f"{attribute} {left} expected {sign} {right} required"
-    measured = inference.measurements
+    measured = inference.state.planned_with()
     for attribute, expected in _values(inference, design, "hasQAestimation"):
         if attribute in measured:
             for left, sign, right in _worse(inference, attribute, measured[attribute], expected):
@@ -489,7 +489,8 @@ class Reasoner:
                 of the rules; the message names the individual and the property, or the rule. Or it
                 takes too long.
         """
-        key: Hashable = state if self.regions is None else repr(self.regions.key(state))
+        inferred_of = replace(state, measured_since=None)
+        key: Hashable = inferred_of if self.regions is None else repr(self.regions.key(state))
         if facts:  # whose numbers the regions do not know
             key = state, facts
         asserted_in = partial(self.base.asserted, facts=facts)

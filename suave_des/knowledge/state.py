@@ -104,12 +104,15 @@ class KnowledgeState:
         components: (component, c_status) as diagnostics report it, for example ("c_thruster_1",
             "FALSE").
         measurements: (quality attribute type, measured value).
+        measured_since: the values that were measured when the inference was over, with which
+            designs are chosen; None: the same.
     """
 
     objectives: tuple[ObjectiveState, ...] = ()
     groundings: tuple[tuple[str, str], ...] = ()
     components: tuple[tuple[str, str], ...] = ()
     measurements: tuple[tuple[str, Decimal], ...] = ()
+    measured_since: tuple[tuple[str, Decimal], ...] | None = None
 
     @classmethod
     def of(
@@ -157,8 +160,13 @@ class KnowledgeState:
                 for each in self.objectives
             ),
             *(f"{name} = {value_text(value)}" for name, value in values),
+            *(f"then {name} = {value_text(value)}" for name, value in self.measured_since or ()),
         ]
         return ", ".join(parts) or "the empty state"
+
+    def planned_with(self) -> dict[str, Decimal]:
+        """The measured values with which designs are chosen."""
+        return dict(self.measurements if self.measured_since is None else self.measured_since)
 
     def grounded(self, function: str) -> str | None:
         """The function design in use for a function."""
@@ -199,8 +207,6 @@ class Inference:
         facts: the inferred facts, none of which is asserted.
         objectives: name of a function's objective, by the function's name.
         groundings: name of a function design's grounding, by the design's name.
-        measured_since: values that were measured while the reasoner inferred, with which designs
-            are chosen; None: those of the state.
     """
 
     state: KnowledgeState
@@ -208,12 +214,6 @@ class Inference:
     facts: frozenset[Fact]
     objectives: Mapping[str, str] = field(compare=False, repr=False)
     groundings: Mapping[str, str] = field(compare=False, repr=False)
-    measured_since: tuple[tuple[str, Decimal], ...] | None = None
-
-    @property
-    def measurements(self) -> dict[str, Decimal]:
-        """The measured values with which designs are chosen."""
-        return dict(self.state.measurements if self.measured_since is None else self.measured_since)
 
     @cached_property
     def asserted(self) -> frozenset[Fact]:

@@ -123,9 +123,11 @@ class System:
         """Add an event and its detail to the mission's record."""
         self._recorder.log(self._manager, Said(event, detail))
 
-    def log_state(self, state: KnowledgeState) -> None:
-        """Add a knowledge state that is reasoned about to the mission's record."""
-        self._recorder.log_state(state)
+    def log_state(self, state: KnowledgeState, began_s: float | None = None) -> None:
+        """Add a knowledge state that is reasoned about to the mission's record, in place of what was
+        added at the time at which the reasoning began; None: now.
+        """
+        self._recorder.log_state(state, self.now_s if began_s is None else began_s)
 
     def stream(self, name: str) -> random.Random:
         """Make a named random stream of this run, the same for every manager."""

@@ -213,11 +213,15 @@ class Metacontrol(ManagingSubsystem):
         """Plan anew after the reasoner's latency, and request the plan's modes; return whether
         another cycle would change nothing.
         """
+        began_s = self.system.now_s
         recovered = self._to_be_forgotten()
         was_idle = self._changes_nothing(reasoning)
         measured_before = self._measured_key()
         yield self.system.env.timeout(latency_s)
-        plan = self._plan_by_now(reasoning, measured_before)
+        by_now = self._plan_by_now(reasoning, measured_before)
+        if self.system.recorded and self.needs_knowledge:
+            self.system.log_state(by_now.inference.state, began_s)
+        plan = by_now.plan
         if not was_idle or plan.designs != reasoning.plan.designs:
             self._log_statuses(reasoning.inference)
             self._carry_out(plan, recovered, latency_s)
@@ -360,7 +364,7 @@ class Metacontrol(ManagingSubsystem):
         measured_before = self._measured_key()
 
         def execute() -> None:
-            for decision in self._plan_by_now(reasoning, measured_before).decisions:
+            for decision in self._plan_by_now(reasoning, measured_before).plan.decisions:
                 if decision.function in functions and decision.design is not None:
                     self.system.change_mode(decision.function, decision.design)
 
@@ -397,22 +401,23 @@ class Metacontrol(ManagingSubsystem):
             self._keep(state, reasoning)
         return reasoning
 
-    def _plan_by_now(self, reasoning: Reasoning, measured_before: Hashable) -> Plan:
+    def _plan_by_now(self, reasoning: Reasoning, measured_before: Hashable) -> Reasoning:
         """Choose designs with the values that are measured now, after the reasoner has inferred
         something of those before.
         """
         self.monitor()
         measured_now = self._measured_key()
         if measured_now == measured_before and self._is_cacheable:
-            return reasoning.plan
+            return reasoning
         key = reasoning.inference.state, measured_now
         found = self._reasonings.get(key)
         if found is None:
             values = [(name, exact(value)) for name, value in sorted(self.measurements.items())]
-            inference = replace(reasoning.inference, measured_since=tuple(values))
+            state = replace(reasoning.inference.state, measured_since=tuple(values))
+            inference = replace(reasoning.inference, state=state)
             found = Reasoning(inference, self.plan(inference))
             self._keep(key, found)
-        return found.plan
+        return found
 
     def _keep(self, key: Hashable, reasoning: Reasoning) -> None:
         """Keep what was inferred and planned."""

@@ -124,6 +124,7 @@ class Cycle(State):
 
     t_s: BoundedNumber
     measurements: dict[str, str]
+    measured_since: dict[str, str] | None = None
 
 
 class ScenarioLine(Recorded):
@@ -140,7 +141,8 @@ class StateOfTable(State):
 
 class MissionLine(Recorded):
     """Another line of it: a mission's states, and its cycles, each with its time, the number of its
-    state, and the measured values.
+    state, and the measured values; and those with which designs were chosen, by the number of a
+    cycle in which these were others.
     """
 
     manager: str
@@ -149,6 +151,7 @@ class MissionLine(Recorded):
     swept: dict[str, Any]
     states: list[StateOfTable]
     cycles: list[list[str | int | BoundedNumber]]
+    measured_since: dict[str, dict[str, str]] = {}
 
     @model_validator(mode="after")
     def _fit(self) -> Self:

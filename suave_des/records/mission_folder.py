@@ -15,7 +15,8 @@ import platform
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields, replace
+from decimal import Decimal
 from importlib.metadata import version
 from operator import attrgetter
 from pathlib import Path
@@ -294,7 +295,8 @@ def knowledge_text(records: Iterable[KnowledgeRecord]) -> str:
         {
             "t_s": round(record.t_s, 6),
             **_plain(record.state),
-            "measurements": {name: format(value, "f") for name, value in record.state.measurements},
+            "measurements": _texts(record.state.measurements),
+            **_since(record.state),
         }
         for record in records
     )
@@ -319,7 +321,8 @@ def mission_line(
     """
     states: dict[tuple[object, ...], int] = {}
     table: list[dict[str, object]] = []
-    cycles = []
+    cycles: list[list[object]] = []
+    since: dict[str, dict[str, str]] = {}
     for record in records:
         state: KnowledgeState = record.state
         measured = tuple(name for name, _ in state.measurements)
@@ -327,11 +330,11 @@ def mission_line(
         index = states.setdefault(key, len(states))
         if index == len(table):
             table.append({**_plain(state), "measured": measured})
-        cycles.append(
-            [round(record.t_s, 6), index, *(format(value, "f") for _, value in state.measurements)]
-        )
+        if state.measured_since is not None:
+            since[str(len(cycles))] = _texts(state.measured_since)
+        cycles.append([round(record.t_s, 6), index, *_texts(state.measurements).values()])
     place = {"manager": manager, "point": point, "run": run, "swept": dict(swept)}
-    return _line({**place, "states": table, "cycles": cycles})
+    return _line({**place, "states": table, "cycles": cycles, "measured_since": since})
 
 
 def _plain(state: KnowledgeState) -> dict[str, object]:
@@ -342,6 +345,16 @@ def _plain(state: KnowledgeState) -> dict[str, object]:
         "groundings": dict(state.groundings),
         "components": dict(state.components),
     }
+
+
+def _texts(measured: Iterable[tuple[str, Decimal]]) -> dict[str, str]:
+    return {name: format(value, "f") for name, value in measured}
+
+
+def _since(state: KnowledgeState) -> dict[str, dict[str, str]]:
+    """The values with which designs were chosen, where they are others than those before."""
+    since = state.measured_since
+    return {} if since is None else {"measured_since": _texts(since)}
 
 
 def _line(content: Mapping[str, object]) -> str:
@@ -358,7 +371,8 @@ def read_knowledge(path: Path) -> tuple[KnowledgeRecord, ...]:
     for line in _lines(path, "mission"):
         with line.located():
             cycle = line.checked(contents.Cycle)
-            records.append(KnowledgeRecord(cycle.t_s, _state(cycle, cycle.measurements)))
+            state = _state(cycle, cycle.measurements, cycle.measured_since)
+            records.append(KnowledgeRecord(cycle.t_s, state))
     return tuple(records)
 
 
@@ -387,11 +401,12 @@ def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> Rec
         own = Scenario.model_validate(at_point)
     except ValidationError:
         raise InputError("the scenario is one that this suave-des does not read") from None
-    records = []
+    records: list[KnowledgeRecord] = []
     for t_s, index, *values in recorded.cycles:
         state = recorded.states[int(index)]
         measured = dict(zip(state.measured, map(str, values), strict=True))
-        records.append(KnowledgeRecord(float(t_s), _state(state, measured)))
+        since = recorded.measured_since.get(str(len(records)))
+        records.append(KnowledgeRecord(float(t_s), _state(state, measured, since)))
     return RecordedKnowledge(recorded.manager, recorded.point, recorded.run, own, tuple(records))
 
 
@@ -428,11 +443,18 @@ def _lines(path: Path, made_by: str) -> Iterator[_Line]:
             yield _Line(path, number, text, made_by)
 
 
-def _state(content: contents.State, measurements: Mapping[str, str]) -> KnowledgeState:
-    objectives = (ObjectiveState(*each) for each in content.objectives)
-    return KnowledgeState.of(
-        objectives,
-        groundings=content.groundings,
-        components=content.components,
-        measurements=measurements,
-    )
+def _state(
+    content: contents.State, measurements: Mapping[str, str], since: Mapping[str, str] | None
+) -> KnowledgeState:
+    objectives = [ObjectiveState(*each) for each in content.objectives]
+
+    def at(measured: Mapping[str, str]) -> KnowledgeState:
+        return KnowledgeState.of(
+            objectives,
+            groundings=content.groundings,
+            components=content.components,
+            measurements=measured,
+        )
+
+    state = at(measurements)
+    return state if since is None else replace(state, measured_since=at(since).measurements)

@@ -8,16 +8,18 @@ import json
 import threading
 import time
 from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 
+from suave_des import run_mission
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import ContradictionError, ObjectiveState
-from tests.helpers.command import python
+from tests.helpers.command import command_here, python
 
 HIGH = {
     "groundings": {"f_generate_search_path": "fd_spiral_high"},
@@ -33,6 +35,32 @@ def test_infers_the_error_and_plans_the_lower_spiral(knowledge):
     assert [(each.function, each.design) for each in reasoning.plan.decisions] == [
         ("f_generate_search_path", "fd_spiral_low")
     ]
+
+
+@pytest.fixture(scope="module")
+def in_murky_water(tmp_path_factory):
+    """The words for a state, in whose cycle the visibility falls below 3.25 m, after its beginning."""
+    folder = tmp_path_factory.mktemp("missions") / "flown"
+    run_mission("seams2023", "metacontrol", 1, 1, folder)
+    return f"{folder}@12"
+
+
+def inferred_at(folder: Path, *words: str) -> str:
+    given = (part for word in words for part in ("--at", word))
+    return command_here("kb", "infer", *given, cwd=folder).stdout
+
+
+def test_a_recorded_state_is_planned_with_the_values_of_its_mission(tmp_path, in_murky_water):
+    printed = inferred_at(tmp_path, in_murky_water)
+    assert "measured    water_visibility = 3.31" in printed
+    assert "planned by  water_visibility = 3.23" in printed
+    assert "f_generate_search_path: fd_spiral_medium" in printed
+
+
+def test_a_value_given_beside_a_recorded_state_counts_for_both(tmp_path, in_murky_water):
+    printed = inferred_at(tmp_path, in_murky_water, "water_visibility=3.3")
+    assert "planned by" not in printed
+    assert "f_generate_search_path: fd_spiral_high stays" in printed
 
 
 def test_without_objectives_the_search_task_s_are_asked_for(knowledge):

@@ -53,8 +53,8 @@ def test_each_design_left_out_has_its_numbers(kb, pellet):
 
 def since(reasoner: Reasoner, state: KnowledgeState, visibility: str) -> tuple[Decision, ...]:
     """Decide with a visibility that is measured after the inference."""
-    measured = (("water_visibility", Decimal(visibility)),)
-    return reasoner.plan(replace(reasoner.analyze(state), measured_since=measured)).decisions
+    later = replace(state, measured_since=(("water_visibility", Decimal(visibility)),))
+    return reasoner.analyze_and_plan(later).plan.decisions
 
 
 def test_a_design_is_chosen_by_what_has_been_measured_since_the_inference(kb, pellet):

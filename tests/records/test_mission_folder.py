@@ -3,6 +3,7 @@ place.
 """
 
 import json
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
@@ -253,6 +254,22 @@ def read_again(records: list[KnowledgeRecord], folder: Path) -> tuple[KnowledgeR
 def test_states_that_differ_in_one_part_stay_different(tmp_path, other):
     records = [KnowledgeRecord(1.0, state()), KnowledgeRecord(2.0, state(**other))]
     assert read_again(records, tmp_path) == tuple(records)
+
+
+SINCE = replace(state(), measured_since=(("water_visibility", Decimal("1.20")),))
+
+
+@pytest.mark.parametrize("states", [[SINCE], [state(), SINCE], [SINCE, state()]])
+def test_values_with_which_designs_were_chosen_stay_in_a_campaigns_states(tmp_path, states):
+    records = [KnowledgeRecord(float(t_s), each) for t_s, each in enumerate(states)]
+    assert read_again(records, tmp_path) == tuple(records)
+
+
+def test_values_with_which_designs_were_chosen_stay_in_a_missions_states(tmp_path):
+    records = (KnowledgeRecord(1.0, state()), KnowledgeRecord(2.0, SINCE))
+    path = tmp_path / KNOWLEDGE_FILE
+    path.write_text(knowledge_text(records), encoding="utf-8")
+    assert read_knowledge(path) == records
 
 
 def test_states_that_differ_in_measured_values_only_are_in_the_table_once():

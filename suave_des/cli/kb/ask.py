@@ -68,6 +68,7 @@ def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterat
         "grounding": state.groundings,
         "component": state.components,
         "measured": state.measurements,
+        "planned by": state.measured_since or (),
     }
     for kind, pairs in parts.items():
         yield from (f"  {kind:<10}  {name} = {value_text(value)}" for name, value in pairs)
