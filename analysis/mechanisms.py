@@ -113,7 +113,7 @@ CHANGES = (
         of_2023={"revision.metacontrol.executes_plans_of_removed_objectives": False},
     ),
     Change(
-        "simulator slower while the reasoner runs, 2025: exponential, mean 15% (not slower)",
+        "simulator slower while the reasoner runs, 2025: exponential, mean 8% (not slower)",
         "metacontrol's missions follow more slowly than others, some by a quarter",
         of_2025={"calibration.reasoning_slowdown": 0.0},
     ),
