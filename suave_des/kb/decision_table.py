@@ -328,12 +328,8 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     _check_settings(layer, settings, header, components)
     designs = _designs(read)
     cells = _cells(path, read, list(scales.values()))
-    for function, places in cells.items():
-        for cell in places.values():
-            _check_overlaps(path, function, cell)
-            for asked, rules in cell.rules.items():
-                if _are_alike(function, rules, designs):
-                    cell.alike[asked] = rules[0]
+    _check_overlaps(path, cells)
+    _note_alike(cells, designs)
     return DecisionTable(
         path,
         settings,
@@ -535,6 +531,17 @@ def _cells(
     return found
 
 
+def _note_alike(
+    cells: Mapping[str, Mapping[tuple[int, ...], _Cell]], designs: Mapping[str, Collection[str]]
+) -> None:
+    """Note in cells what their rules decide alike."""
+    for function, places in cells.items():
+        for cell in places.values():
+            for asked, rules in cell.rules.items():
+                if _are_alike(function, rules, designs):
+                    cell.alike[asked] = rules[0]
+
+
 def _are_alike(
     function: str, rules: Sequence[_Rule], designs: Mapping[str, Collection[str]]
 ) -> bool:
@@ -571,18 +578,11 @@ def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
     return tuple(filter(is_inside, range(len(scale))))
 
 
-def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
+def _check_overlaps(path: Path, cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]) -> None:
     """Check that no two rows decide one state differently."""
-    for one, rules in cell.rules.items():
-        wider = set(itertools.product({one[0], None}, {one[1], None}))
-        if None in one:  # (any, design) and (reports, any) have states in common, too
-            wider |= {each for each in cell.rules if _agree(one, each)}
-        for rule, other in itertools.product(
-            rules, itertools.chain.from_iterable(cell.rules.get(each, ()) for each in wider)
-        ):
-            if rule.then == other.then:
-                continue
-            if all(other.others.get(name, now) == now for name, now in rule.others.items()):
+    for function, places in cells.items():
+        for cell in places.values():
+            for rule, other in _contradicting(cell):
                 first, second = sorted((rule, other), key=lambda each: each.line)
                 both = f"{second.then} here, and {first.then} in line {first.line}"
                 remedy = (
@@ -590,6 +590,21 @@ def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
                     " components count alike"
                 )
                 raise line_error(path, second.line, f"{function}: {both}, for one state", remedy)
+
+
+def _contradicting(cell: _Cell) -> Iterator[tuple[_Rule, _Rule]]:
+    """Pairs of rules that decide a state that they have in common differently."""
+    for one, rules in cell.rules.items():
+        wider = set(itertools.product({one[0], None}, {one[1], None}))
+        if None in one:  # (any, design) and (reports, any) have states in common, too
+            wider |= {each for each in cell.rules if _agree(one, each)}
+        for rule, other in itertools.product(
+            rules, itertools.chain.from_iterable(cell.rules.get(each, ()) for each in wider)
+        ):
+            if rule.then != other.then and all(
+                other.others.get(name, now) == now for name, now in rule.others.items()
+            ):
+                yield rule, other
 
 
 def _agree(one: _Asked, other: _Asked) -> bool:
