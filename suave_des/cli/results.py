@@ -472,7 +472,7 @@ def _check_one_source(folders: Sequence[Path], scenario: str | None) -> None:
 
 
 def _page_file(out: Path | None, folder: Path, name: str) -> Path:
-    """Return the file for a page, which can be written: `name` among results, if no other is given."""
+    """Return the file to write a page to: `name` among the results, if no other is given."""
     if out is None:
         check_beside(folder, [name])
         return folder / name
