@@ -7,7 +7,7 @@ import os
 import pickle
 import platform
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from enum import Enum, EnumType
 from hashlib import sha256
@@ -210,10 +210,7 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
             yield from _of_function(value, seen)
     elif ismodule(value):
         yield value.__name__
-        for name in names:
-            if hasattr(value, name):
-                yield name
-                yield from _ingredients(getattr(value, name), names, seen)
+        yield from _of_names(names, vars(value), names, seen)
     elif isinstance(value, tuple):
         yield f"{type(value).__name__} of {len(value)}"
         for each in value:
@@ -242,7 +239,15 @@ def _of_function(function: Any, seen: list[object]) -> Iterator[str]:
         arguments = code.co_flags & (CO_VARARGS | CO_VARKEYWORDS), code.co_argcount
         yield f"{code.co_code.hex()} {code.co_exceptiontable.hex()} {arguments} {constants}"
         yield f"{code.co_names} {code.co_varnames} {code.co_freevars}"
-        for name in (*code.co_names, *code.co_freevars):
-            if name in values:
-                yield name
-                yield from _ingredients(values[name], code.co_names, seen)
+        used = (*code.co_names, *code.co_freevars)
+        yield from _of_names(used, values, code.co_names, seen)
+
+
+def _of_names(
+    used: Iterable[str], values: Mapping[str, Any], names: Sequence[str], seen: list[object]
+) -> Iterator[str]:
+    """Yield the names that have a value, and the ingredients of these."""
+    for name in used:
+        if name in values:
+            yield name
+            yield from _ingredients(values[name], names, seen)

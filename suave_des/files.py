@@ -283,6 +283,13 @@ def json_text(content: Mapping[str, object]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
+def check_ending(file: Path, endings: Iterable[str], what: str) -> None:
+    """Raise an InputError unless a file has one of some endings; `what` it is to be: "a table"."""
+    if file.suffix.lower() not in endings:
+        problem = f"expected {what}, got {file.suffix or 'a file without an ending'}"
+        raise InputError(problem, file=file, remedy=f"one of {', '.join(endings)}")
+
+
 def check_output_folder(
     folder: Path,
     family: str,
@@ -304,9 +311,11 @@ def check_output_folder(
             file, or cannot be written.
     """
     with _user_errors(folder):
-        entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
-        is_there = folder.exists() or folder.is_symlink()
-        has_parent = folder.parent.is_dir()
+        is_folder = folder.is_dir()
+        entries = [entry.name for entry in folder.iterdir()] if is_folder else []
+        is_there = os.path.lexists(folder)
+        place = folder if is_there else folder.parent
+        has_place = place.is_dir()
     _check_family(folder, family, entries)
     if overwrite and is_there:
         _check_replaced(folder, family, entries, noted)
@@ -319,17 +328,17 @@ def check_output_folder(
             "give another folder, or --overwrite to replace the results in it",
         ),
         (
-            is_there and not folder.is_dir(),
+            is_there and not is_folder,
             "the output folder is not a folder",
             "give another path",
         ),
         (
-            not (is_there or has_parent),
+            not has_place,
             f"there is no folder {folder.parent} to make it in",
             "make that folder first",
         ),
         (
-            not os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK),
+            not os.access(place, os.W_OK | os.X_OK),
             "the output folder cannot be written",
             "give a folder that is yours",
         ),

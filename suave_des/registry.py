@@ -230,13 +230,7 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     found = getattr(module, attribute, None)
     if not _is_derived(found, base):
         problem = f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}"
-        file = getattr(module, "__file__", None)
-        here = Path(f"{module_name.replace('.', '/')}.py")
-        if here.is_file() and not (file and here.samefile(file)):
-            raise InputError(
-                f"{problem}: it is {file or 'a part of Python'}, not {here} in this folder",
-                remedy="rename your file, as installed modules come first",
-            )
+        _check_not_hidden(problem, module)
         classes = [name for name, each in vars(module).items() if _is_derived(each, base)]
         remedy = nearest(attribute, classes) or f"derive it from suave_des.{base.__name__}"
         raise InputError(problem, remedy=remedy)
@@ -244,6 +238,19 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
         check_class(what, found, base)
         _checked.add(found)
     return found
+
+
+def _check_not_hidden(problem: str, module: ModuleType) -> None:
+    """Raise an InputError with that problem if a file in this folder is hidden by a module of its
+    name.
+    """
+    file = getattr(module, "__file__", None)
+    here = Path(f"{module.__name__.replace('.', '/')}.py")
+    if here.is_file() and not (file and here.samefile(file)):
+        raise InputError(
+            f"{problem}: it is {file or 'a part of Python'}, not {here} in this folder",
+            remedy="rename your file, as installed modules come first",
+        )
 
 
 def _is_derived(found: object, base: type[_Base]) -> TypeGuard[type[_Base]]:

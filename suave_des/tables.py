@@ -149,14 +149,7 @@ class Table:
                 alignment = r">{\raggedright\arraybackslash}p{0.31\linewidth}" + alignment[1:]
         lines += [rf"  \begin{{tabular}}{{{alignment}}}", r"    \toprule"]
         if over:
-            each = (columns - 1) // len(over)
-            begins = range(2, columns + 1, each)
-            heads = [rf"\multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over]
-            lines.append(_latex_row(["", *heads]))
-            lines.append(
-                "    "
-                + " ".join(rf"\cmidrule(lr){{{begin}-{begin + each - 1}}}" for begin in begins)
-            )
+            lines += _latex_over(over, (columns - 1) // len(over))
         lines.append(_latex_row(map(latex_text, self.headings)))
         if not self.rows or len(self.rows[0]) > 1:
             lines.append(r"    \midrule")
@@ -339,6 +332,14 @@ def markdown_text(text: str) -> str:
 def latex_text(text: str) -> str:
     """Write text so that LaTeX shows it as it is."""
     return text.translate(_LATEX)
+
+
+def _latex_over(headings: Sequence[str], columns: int) -> list[str]:
+    """Write headings over so many columns each, all but the first one."""
+    heads = [rf"\multicolumn{{{columns}}}{{c}}{{{latex_text(each)}}}" for each in headings]
+    begins = range(2, 2 + len(headings) * columns, columns)
+    rules = [rf"\cmidrule(lr){{{begin}-{begin + columns - 1}}}" for begin in begins]
+    return [_latex_row(["", *heads]), f"    {' '.join(rules)}"]
 
 
 def _latex_row(cells: Iterable[str]) -> str:

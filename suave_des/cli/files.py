@@ -27,15 +27,16 @@ def scenarios() -> None:
     modes = [path for path in files if path.stem.endswith("_modes")]
     rows = []
     for path in files:
-        if path not in campaigns and path not in modes:
+        if path not in (*campaigns, *modes):
             scenario = load_scenario(path).scenario
             rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
     print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}")
-    console.print(f"Modes files: {', '.join(path.name for path in modes)}")
-    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}")
+    console.print()
+    others = {"Campaign files": campaigns, "Modes files": modes, "Ontologies": ontologies}
+    for kind, paths in others.items():
+        console.print(f"{kind}: {', '.join(path.name for path in paths)}")
     console.print(f"They are in {folder.parent}: copy what you want to change.")
 
 
@@ -74,11 +75,10 @@ def import_config(
     """
     from suave_des.exemplar.configurations import import_config as imported_from
     from suave_des.registry import manager_names
-    from suave_des.resources import shipped_folder
 
-    targets = [out] if campaign is None else [out, campaign]
+    targets = list(filter(None, (out, campaign)))
     for target in targets:
-        if real(target) in [real(file) for file in (*files, *targets) if file is not target]:
+        if list(map(real, (*files, *targets))).count(real(target)) > 1:
             raise InputError(
                 "is one of the other files, too",
                 file=target,
@@ -90,9 +90,8 @@ def import_config(
     tables = {path.stem for path in shipped_folder("scenarios/managers").glob("*.csv")}
     managers = [name for name in manager_names() if name not in tables]
     imported = imported_from(files, out, managers=managers, **given)  # type: ignore[arg-type]
-    for target, text in zip(
-        targets, filter(None, (imported.scenario, imported.campaign)), strict=True
-    ):
+    texts = filter(None, (imported.scenario, imported.campaign))
+    for target, text in zip(targets, texts, strict=True):
         write_files(target.parent, {target.name: text})
     for note in imported.notes:
         print(plain(note))

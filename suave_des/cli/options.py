@@ -149,15 +149,16 @@ class Fields:
             given = typer.Option(
                 _flag(name),
                 metavar=shown_as.metavar,
-                help=self.help.get(name) or " ".join(texts[name].split()),
-                show_default=self.default.get(name)
-                or shown_as.default
-                or _written(declared.default)
-                or False,
+                help=self.help.get(name, " ".join(texts[name].split())),
+                show_default=self.default.get(
+                    name, shown_as.default or _written(declared.default) or False
+                ),
                 autocompletion=complete_managers if name == "managers" else None,
             )
-            default, accepted = (False, bool) if kind is bool else (None, kind | None)
-            yield _keyword(name, default, Annotated[accepted, given])
+            if kind is bool:
+                yield _keyword(name, False, Annotated[bool, given])
+            else:
+                yield _keyword(name, None, Annotated[kind | None, given])
 
     def taken(self, given: dict[str, Any]) -> Given:
         """Take what is given from a command's arguments; of names, there may be several, with

@@ -32,6 +32,7 @@ from suave_des.errors import shown as quoted
 from suave_des.files import (
     VALIDATION_FILES,
     check_beside,
+    check_ending,
     check_output_file,
     check_output_folder,
     make_output_folder,
@@ -141,9 +142,7 @@ def compare(
     from suave_des.results.groups import grouped
 
     if out is not None:
-        if out.suffix.lower() not in _ENDINGS:
-            problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
-            raise InputError(problem, file=out, remedy=f"one of {', '.join(_ENDINGS)}")
+        check_ending(out, _ENDINGS, "a table")
         check_output_file(out, overwrite=True)
     names, columns, points = map(comma_separated, (managers, metrics, by))
     if (assisted_by is None) != (population is None):
@@ -448,15 +447,13 @@ def replay(
     folders = folders or []
     _check_one_source(folders, scenario)
     names = comma_separated(managers)
-    page_file = out or (folders[0] if folders else Path()) / "replay.html"
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
+        page_file = _page_file(out, folders[0], "replay.html")
     else:
         check_no_use({"--point": point}, "without a campaign's folder")
-    if out is not None or not folders:
+        page_file = out or Path("replay.html")
         check_output_file(page_file, overwrite=True)
-    else:
-        check_beside(page_file.parent, [page_file.name])
     if scenario is not None:
         loaded = load_scenario(scenario, **files.replacements)
         missions = missions_run(loaded, names or ("metacontrol",), run, 1 if seed is None else seed)
@@ -472,6 +469,15 @@ def _check_one_source(folders: Sequence[Path], scenario: str | None) -> None:
         problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
         remedy = "give DIR, the --out folder of run or campaign, or --scenario NAME"
         raise InputError(problem, remedy=remedy)
+
+
+def _page_file(out: Path | None, folder: Path, name: str) -> Path:
+    """Return the file to write a page to: `name` among the results, if no other is given."""
+    if out is None:
+        check_beside(folder, [name])
+        return folder / name
+    check_output_file(out, overwrite=True)
+    return out
 
 
 def report(
@@ -499,10 +505,6 @@ def report(
     from suave_des.pages.report import report_page
 
     first = results[0]
-    page_file = out or (first if first.is_dir() else first.parent) / "report.html"
-    if out is not None:
-        check_output_file(page_file, overwrite=True)
-    else:
-        check_beside(page_file.parent, [page_file.name])
+    page_file = _page_file(out, first if first.is_dir() else first.parent, "report.html")
     write_page(page_file, report_page(results, paths, _labels(label)), show=show)
     print(f"the report is {page_file}")

@@ -28,7 +28,7 @@ from websockets.http11 import Request, Response
 from suave_des.campaign.missions import Campaign, Finished, MissionRunner, Remark
 from suave_des.clock import call_at, tick_at_or_after
 from suave_des.domain import DEFAULT_MODE, Task
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown, unknown
 from suave_des.files import json_value
 from suave_des.interfaces.client import CANCEL_TASK, REQUEST_TASK, ClientManager
 from suave_des.interfaces.serve import (
@@ -492,25 +492,21 @@ class Bridge:
         client.send("service_response", **answer, **_id_of(message))
 
     def _served(self, service: str, given: Any) -> Json:
-        function, _, name = service[1:].rpartition("/")
-        modes = self._mission.modes.get(function, ())
         if service == ADVANCE_SERVICE:
             step_s = seconds(_arguments(given, (ADVANCE,)).get(ADVANCE))
             self._advance(self._mission.now_s + max(step_s, _LATER_S))
             return self._session.time()
-        if modes and name == "change_mode":
-            wanted = _arguments(given, ("mode_name", LATENCY))
-            return self._change_mode(function, wanted)
-        if modes and name == "get_mode":
-            requested = self._mission.current_mode(function) or ""
-            return {"current_mode": self._in_force[function], "target_mode": requested}
-        if modes and name == "get_available_modes":
-            return {"available_modes": modes}
         kinds = "change_mode", "get_mode", "get_available_modes"
         known = [f"/{each}/{kind}" for each in self._mission.modes for kind in kinds]
-        raise InputError(
-            f"there is no service {shown(service)}", remedy=did_you_mean(service, known)
-        )
+        if service not in known:
+            raise unknown(f"there is no service {shown(service)}", service, known)
+        function, _, name = service[1:].rpartition("/")
+        if name == "change_mode":
+            return self._change_mode(function, _arguments(given, ("mode_name", LATENCY)))
+        if name == "get_mode":
+            requested = self._mission.current_mode(function) or ""
+            return {"current_mode": self._in_force[function], "target_mode": requested}
+        return {"available_modes": self._mission.modes[function]}
 
     def _change_mode(self, function: str, wanted: Json) -> Json:
         mode = _text(wanted, "mode_name")
@@ -534,9 +530,7 @@ class Bridge:
     def _set_level(self, client: _Client, message: Json) -> None:
         level = _text(message, "level")
         if level not in _LEVELS:
-            raise InputError(
-                f"there is no level {shown(level)}", remedy=did_you_mean(level, _LEVELS)
-            )
+            raise unknown(f"there is no level {shown(level)}", level, _LEVELS)
         client.level = level
 
 

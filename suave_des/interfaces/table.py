@@ -185,28 +185,22 @@ def _opened(path: Path, mtime_ns: int, size: int, settings: str) -> DecisionTabl
 def _check_names(table: DecisionTable, loaded: LoadedScenario) -> None:
     """Check that a scenario has what a table names."""
     modes = loaded.modes
+
+    def check(word: str, known: Iterable[str], line: int, problem: str) -> None:
+        if word not in known:
+            raise line_error(table.path, line, problem, did_you_mean(word, known))
+
     for function, designs in table.designs.items():
         for design, line in designs.items():
-            if function not in modes.functions:
-                remedy = did_you_mean(function, modes.functions)
-                raise line_error(
-                    table.path, line, f"there is no function {shown(function)}", remedy
-                )
-            if design not in modes.modes(function):
-                problem = f"{function} has no mode {shown(design)}"
-                remedy = did_you_mean(design, [*modes.modes(function), STAYS, NONE_LEFT])
-                raise line_error(table.path, line, problem, remedy)
+            check(function, modes.functions, line, f"there is no function {shown(function)}")
+            choices = [*modes.modes(function), STAYS, NONE_LEFT]
+            check(design, choices, line, f"{function} has no mode {shown(design)}")
     for component, statuses in table.components.items():
         for status, line in statuses.items():
-            if component not in REPORTED_STATUSES:
-                problem = f"there is no component {shown(component)}"
-                raise line_error(
-                    table.path, line, problem, did_you_mean(component, REPORTED_STATUSES)
-                )
-            if status not in REPORTED_STATUSES[component]:
-                problem = f"{component} never reports {shown(status)}"
-                remedy = did_you_mean(status, REPORTED_STATUSES[component])
-                raise line_error(table.path, line, problem, remedy)
+            there_is_none = f"there is no component {shown(component)}"
+            check(component, REPORTED_STATUSES, line, there_is_none)
+            reported = REPORTED_STATUSES[component]
+            check(status, reported, line, f"{component} never reports {shown(status)}")
     known = sorted({*loaded.scenario.signals, WATER_VISIBILITY, BATTERY_LEVEL})
     columns = product(loaded.scenario.needed_functions(), ("_now", "_then"))
     for name in table.attributes:

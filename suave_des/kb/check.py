@@ -239,7 +239,7 @@ def _finding(
     name = "an individual without a name" if isinstance(thing, BNode) else local_name(str(thing))
     path = report.value(result, _SH.resultPath)
     level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
-    words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))
+    words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage)))
     message = ": ".join(filter(None, words))
     is_value = path == URIRef(HAS_VALUE) and name.startswith(measurement_name(""))
     if is_value and not any((thing, path, None) in source.graph for source in sources):

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from suave_des.domain import THRUSTER_NAMES
-from suave_des.errors import InputError, did_you_mean, line_error, shown
+from suave_des.errors import InputError, did_you_mean, line_error, located, shown
 from suave_des.files import decode, read_bytes
 from suave_des.kb.scale import Scale, TestedRegion, is_in, parse_region
 from suave_des.kb.situations import INCONSISTENT, Outcome, Situation
@@ -78,18 +78,28 @@ class TableSettings(Strict):
 
 class _Rule(NamedTuple):
     """What a row says of one function: `others` are the designs of other functions that it asks
-    for; None: what rows decide alike for each of these, and so where no row asks for them.
+    for.
     """
 
-    others: Mapping[str, str] | None
+    others: Mapping[str, str]
     then: str
     line: int
 
 
 #: What components report, and the design in use, "" where there is no objective; None: any.
 _Asked = tuple[Reports | None, str | None]
-#: By what is asked: rules that differ in other functions' designs.
-_Cell = dict[_Asked, list[_Rule]]
+
+
+class _Cell(NamedTuple):
+    """What is decided at some places of measured values, by what is asked.
+
+    Attributes:
+        rules: that differ in other functions' designs.
+        alike: what rules decide alike for each of these, and so where no row asks for them.
+    """
+
+    rules: dict[_Asked, list[_Rule]]
+    alike: dict[_Asked, _Rule]
 
 
 class _Row(NamedTuple):
@@ -126,11 +136,9 @@ class DecisionTable:
 
     def related(self, function: str) -> tuple[str, ...]:
         """Functions on whose designs a function's decisions depend: itself, and maybe others."""
-        rules = itertools.chain.from_iterable(
-            itertools.chain.from_iterable(each.values())
-            for each in self._cells.get(function, {}).values()
-        )
-        others = {name for rule in rules for name in rule.others or ()}
+        cells = self._cells.get(function, {}).values()
+        rules = itertools.chain.from_iterable(cell.rules.values() for cell in cells)
+        others = set[str]().union(*(rule.others for rule in itertools.chain.from_iterable(rules)))
         return function, *sorted(others - {function})
 
     def rule(self, function: str, state: KnowledgeState) -> tuple[str, int]:
@@ -145,8 +153,12 @@ class DecisionTable:
         measured = dict(state.measurements)
         places = [scale.place(measured.get(name)) for name, scale in self.attributes.items()]
         found = self._found(function, state, places)
-        if found is not None:
-            return found.then, found.line
+        if found is None:
+            raise self._undecided(function, state, places)
+        return found.then, found.line
+
+    def _undecided(self, function: str, state: KnowledgeState, places: Sequence[int]) -> InputError:
+        """Make the error for a state in which no row decides a function."""
         values = zip(self.attributes.items(), places, strict=True)
         words = [f"{name} {scale.text(place)}" for (name, scale), place in values]
         reports = "; ".join(f"{name}={status}" for name, status in self.reports(state.components))
@@ -155,7 +167,7 @@ class DecisionTable:
             f"{name} now {_now(state, name) or '(not needed)'}" for name in self.related(function)
         )
         beside = sorted(self._beside(function, state, places))
-        raise InputError(
+        return InputError(
             f"no row decides {function} where {', '.join([*nows, *words])}",
             file=self.path,
             place=f"beside line {' and '.join(map(str, beside[:2]))}" if beside else None,
@@ -164,17 +176,14 @@ class DecisionTable:
         )
 
     def _found(self, function: str, state: KnowledgeState, places: Sequence[int]) -> _Rule | None:
-        cell = self._cells[function].get(tuple(places), {})
+        cell = self._cells[function].get(tuple(places), _NOTHING)
         reports = self.reports(state.components)
         now = _now(state, function)
-        alike = None
-        for asked in itertools.product((reports, None), (now, None)):
-            for rule in cell.get(asked, ()):
-                if rule.others is None:
-                    alike = alike or rule
-                elif all(_now(state, name) == design for name, design in rule.others.items()):
-                    return rule
-        return alike
+        wider = list(itertools.product((reports, None), (now, None)))
+        for rule in itertools.chain.from_iterable(cell.rules.get(asked, ()) for asked in wider):
+            if all(_now(state, name) == design for name, design in rule.others.items()):
+                return rule
+        return next((cell.alike[asked] for asked in wider if asked in cell.alike), None)
 
     def _beside(self, function: str, state: KnowledgeState, places: Sequence[int]) -> Iterator[int]:
         """Lines that decide in the ranges next to a place."""
@@ -268,6 +277,9 @@ class DecisionTable:
         )
 
 
+_NOTHING: Final = _Cell({}, {})
+
+
 def _now(state: KnowledgeState, function: str) -> str:
     """The design in use, as tables have it: "" for a function without objective."""
     if all(each.function != function for each in state.objectives):
@@ -328,6 +340,9 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     components = _lines((*each, row.line) for row in read for each in row.reports or ())
     _check_settings(layer, settings, header, components)
     designs = _designs(read)
+    cells = _cells(path, read, list(scales.values()))
+    _check_overlaps(path, cells)
+    _note_alike(cells, designs)
     return DecisionTable(
         path,
         settings,
@@ -335,7 +350,7 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
         any(row.reports is not None for row in read),
         components,
         designs,
-        _cells(path, read, list(scales.values()), designs),
+        cells,
     )
 
 
@@ -365,7 +380,7 @@ def _layer(path: Path, head: Sequence[str]) -> Layer:
 def _check_settings(
     layer: Layer, settings: TableSettings, header: Iterable[str], components: Iterable[str]
 ) -> None:
-    functions = [name.removesuffix(_THEN) for name in header if name.endswith(_THEN)]
+    functions = _deciding(header)
     for number, name in enumerate(settings.order):
         if name not in functions:
             problem = f"no column decides a function {shown(name)}"
@@ -415,7 +430,7 @@ def _check_header(path: Path, line: int, header: Sequence[str]) -> None:
         if header.count(name) > 1 or not name:
             problem = f"the column {shown(name)} is there twice" if name else "a column has no name"
             raise line_error(path, line, problem, "give each column a name of its own")
-    if not any(name.endswith(_THEN) for name in header):
+    if not _deciding(header):
         problem = "no column says what is decided"
         raise line_error(path, line, problem, f"add one such as f_maintain_motion{_THEN}")
 
@@ -423,6 +438,11 @@ def _check_header(path: Path, line: int, header: Sequence[str]) -> None:
 def _attributes(header: Iterable[str]) -> list[str]:
     others = (_COMPONENTS, _AGAIN, *_NO_RESULT)
     return [name for name in header if name not in others and not name.endswith((_NOW, _THEN))]
+
+
+def _deciding(header: Iterable[str]) -> list[str]:
+    """Functions that columns decide."""
+    return [name.removesuffix(_THEN) for name in header if name.endswith(_THEN)]
 
 
 def _check_decisions(path: Path, line: int, then: Mapping[str, str]) -> None:
@@ -443,23 +463,19 @@ def _row(path: Path, line: int, cells: Mapping[str, str], settings: TableSetting
 
     regions = []
     for name in _attributes(cells):
-        try:
+        with located(file=path, place=f"line {line}, {name}"):
             regions.append(_parts(cells[name].strip()))
-        except InputError as error:
-            raise InputError(
-                error.problem, file=path, place=f"line {line}, {name}", remedy=error.remedy
-            ) from None
     then = {name: design for name, design in by_function(_THEN).items() if design}
     _check_decisions(path, line, then)
     reports = _reports(path, line, cells.get(_COMPONENTS, _ANY), settings)
     now = by_function(_NOW)
+    functions = _deciding(cells)
     for function in filter(None, map(str.strip, cells.get(_AGAIN, "").split(";"))):
-        if f"{function}{_THEN}" not in cells:
-            functions = [name.removesuffix(_THEN) for name in cells if name.endswith(_THEN)]
+        if function not in functions:
             problem = f"{_AGAIN}: no column decides a function {shown(function)}"
             raise line_error(path, line, problem, did_you_mean(function, functions))
-        if then.get(function) == STAYS and function in now:
-            then[function] = now[function]
+        if then.get(function) == STAYS:
+            then[function] = now.get(function, STAYS)
     return _Row(line, tuple(regions), reports, now, then)
 
 
@@ -508,10 +524,7 @@ def _lines(named: Iterable[tuple[str, str, int]]) -> dict[str, dict[str, int]]:
 
 
 def _cells(
-    path: Path,
-    rows: Iterable[_Row],
-    scales: Sequence[Scale],
-    designs: Mapping[str, Collection[str]],
+    path: Path, rows: Iterable[_Row], scales: Sequence[Scale]
 ) -> dict[str, dict[tuple[int, ...], _Cell]]:
     found: dict[str, dict[tuple[int, ...], _Cell]] = {}
     number = 0
@@ -525,16 +538,21 @@ def _cells(
                 remedy = "compare measured values with fewer numbers"
                 raise line_error(path, row.line, f"more than {_MOST_CELLS:,} cells", remedy)
             others = {name: now for name, now in row.now.items() if name != function}
-            cell = found.setdefault(function, {}).setdefault(places, {})
+            cell = found.setdefault(function, {}).setdefault(places, _Cell({}, {}))
             asked = row.reports, row.now.get(function)
-            cell.setdefault(asked, []).append(_Rule(others, then, row.line))
-    for function, cells in found.items():
-        for cell in cells.values():
-            _check_overlaps(path, function, cell)
-            for rules in cell.values():
-                if _are_alike(function, rules, designs):
-                    rules.append(rules[0]._replace(others=None))
+            cell.rules.setdefault(asked, []).append(_Rule(others, then, row.line))
     return found
+
+
+def _note_alike(
+    cells: Mapping[str, Mapping[tuple[int, ...], _Cell]], designs: Mapping[str, Collection[str]]
+) -> None:
+    """Note in cells what their rules decide alike."""
+    for function, places in cells.items():
+        for cell in places.values():
+            for asked, rules in cell.rules.items():
+                if _are_alike(function, rules, designs):
+                    cell.alike[asked] = rules[0]
 
 
 def _are_alike(
@@ -550,10 +568,9 @@ def _are_alike(
     by_needed: dict[frozenset[str], set[tuple[tuple[str, str], ...]]] = {}
     never = set[str]()
     for rule in rules:
-        asked = sorted((rule.others or {}).items())
-        never.update(name for name, _ in asked)
-        needed = tuple((name, now) for name, now in asked if now)
-        by_needed.setdefault(frozenset(name for name, _ in needed), set()).add(needed)
+        never.update(rule.others)
+        needed = {name: now for name, now in sorted(rule.others.items()) if now}
+        by_needed.setdefault(frozenset(needed), set()).add(tuple(needed.items()))
     never.difference_update(*by_needed)
     if never and not never.union([function]).isdisjoint(LASTING):
         return False
@@ -574,19 +591,11 @@ def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
     return tuple(filter(is_inside, range(len(scale))))
 
 
-def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
+def _check_overlaps(path: Path, cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]) -> None:
     """Check that no two rows decide one state differently."""
-    for one, rules in cell.items():
-        wider = set(itertools.product({one[0], None}, {one[1], None}))
-        if None in one:  # (any, design) and (reports, any) have states in common, too
-            wider |= {each for each in cell if _agree(one, each)}
-        for rule, other in itertools.product(
-            rules, itertools.chain.from_iterable(cell.get(each, ()) for each in wider)
-        ):
-            if rule.then == other.then:
-                continue
-            asked = other.others or {}
-            if all(asked.get(name, now) == now for name, now in (rule.others or {}).items()):
+    for function, places in cells.items():
+        for cell in places.values():
+            for rule, other in _contradicting(cell):
                 first, second = sorted((rule, other), key=lambda each: each.line)
                 both = f"{second.then} here, and {first.then} in line {first.line}"
                 remedy = (
@@ -594,6 +603,21 @@ def _check_overlaps(path: Path, function: str, cell: _Cell) -> None:
                     " components count alike"
                 )
                 raise line_error(path, second.line, f"{function}: {both}, for one state", remedy)
+
+
+def _contradicting(cell: _Cell) -> Iterator[tuple[_Rule, _Rule]]:
+    """Pairs of rules that decide a state that they have in common differently."""
+    for one, rules in cell.rules.items():
+        wider = set(itertools.product({one[0], None}, {one[1], None}))
+        if None in one:  # (any, design) and (reports, any) have states in common, too
+            wider |= {each for each in cell.rules if _agree(one, each)}
+        for rule, other in itertools.product(
+            rules, itertools.chain.from_iterable(cell.rules.get(each, ()) for each in wider)
+        ):
+            if rule.then != other.then and all(
+                other.others.get(name, now) == now for name, now in rule.others.items()
+            ):
+                yield rule, other
 
 
 def _agree(one: _Asked, other: _Asked) -> bool:

@@ -6,7 +6,7 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
@@ -156,33 +156,37 @@ class PolicyDifference:
 
     def _ranges(self, cells: pandas.DataFrame) -> Iterator[str]:
         """The ranges of measured values, neighbours joined, and the number of states in each."""
-        names, scale = list(self.space.attributes), self.space.scale
-        boxes = Counter[
-            tuple[tuple[int, int], ...]
-        ]()  # number of states by first and last place of each attribute
-        for *places, number in cells[[*names, "states"]].itertuples(index=False):
-            boxes[tuple((place, place) for place in places)] += number
-        for at in reversed(range(len(names))):
-            joined: dict[
-                Any, tuple[int, int]
-            ] = {}  # first place and number of states by all other ends
-            for box, number in sorted(boxes.items(), key=lambda each: each[0][at]):
-                first, last = box[at]
-                first, before = joined.pop((box[:at], first - 1, box[at + 1 :]), (first, 0))
-                joined[box[:at], last, box[at + 1 :]] = first, before + number
-            boxes = Counter(
-                {
-                    (*a, (first, last), *b): number
-                    for (a, last, b), (first, number) in joined.items()
-                }
-            )
-        for box, number in sorted(boxes.items()):
+        names = self.space.attributes
+        scale = self.space.scale
+        for box, number in sorted(_boxes(cells, names).items()):
             words = [
                 f"{name} {scale.text(*span)}" if len(names) > 1 else scale.text(*span)
                 for name, span in zip(names, box, strict=True)
                 if span != (0, len(scale) - 1)
             ]
             yield f"{'; '.join(words) or 'whatever is measured'}: {number_of(number, 'state')}"
+
+
+#: First and last place of each attribute.
+_Box = tuple[tuple[int, int], ...]
+
+
+def _boxes(cells: pandas.DataFrame, names: Sequence[str]) -> dict[_Box, int]:
+    """The number of states in each box of measured values, neighbours joined."""
+    boxes = Counter[_Box]()
+    for *places, number in cells[[*names, "states"]].itertuples(index=False):
+        boxes[tuple((place, place) for place in places)] += number
+    for at in reversed(range(len(names))):
+        # first place and number of states by all other ends
+        joined: dict[Any, tuple[int, int]] = {}
+        for box, number in sorted(boxes.items(), key=lambda each: each[0][at]):
+            first, last = box[at]
+            first, before = joined.pop((box[:at], first - 1, box[at + 1 :]), (first, 0))
+            joined[box[:at], last, box[at + 1 :]] = first, before + number
+        boxes = Counter(
+            {(*a, (first, last), *b): number for (a, last, b), (first, number) in joined.items()}
+        )
+    return boxes
 
 
 def compare_decisions(
@@ -301,14 +305,11 @@ def firing_states(
     )
     regions = regions_of(bases[1])
     missions = (run_mission(loaded[0], _MANAGER, run, seed) for run in range(1, runs + 1))
-    states = Counter[Hashable]()
-    representatives: dict[Hashable, KnowledgeState] = {}
+    alike = defaultdict[Hashable, list[KnowledgeState]](list)
     for record in chain.from_iterable(mission.knowledge for mission in missions):
-        key = regions.key(record.state)
-        representatives.setdefault(key, record.state)
-        states[key] += 1
-    firing = (key for key, state in representatives.items() if probes.holding(Situation(state)))
-    return sum(states[key] for key in firing), states.total()
+        alike[regions.key(record.state)].append(record.state)
+    firing = [states for states in alike.values() if probes.holding(Situation(states[0]))]
+    return sum(map(len, firing)), sum(map(len, alike.values()))
 
 
 def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:

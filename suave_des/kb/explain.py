@@ -21,7 +21,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
-from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.errors import InputError, KnowledgeError, shown, unknown
 from suave_des.kb import matching
 from suave_des.kb.matching import Binding, Bound, Facts, bound, with_bindings
 from suave_des.kb.states import FactReader
@@ -460,7 +460,7 @@ class RuleQuestions:
         answers = [self.of(rule, state) for rule in self.base.rules if rule.name == name]
         if not answers:
             known = sorted({rule.name for rule in self.base.rules})
-            raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, known))
+            raise unknown(f"there is no rule {shown(name)}", name, known)
         return next((each for each in answers if each.fires), answers[0])
 
     def of(
@@ -480,16 +480,18 @@ class RuleQuestions:
             return WhyNot(rule.name, never)
         binding, failing = matching.nearest_match(rule, facts, start)
         if rule in firing and not (failing and start):
-            bindings = () if failing else matching.shown_bindings(binding, self.base.names)
-            return self._firing(rule, binding, with_bindings(bindings))
+            return self._firing(rule, binding, is_known=not failing)
         if not failing:
             words = "it does not fire, though each atom of its body holds"
             return WhyNot(rule.name, words, failing=len(rule.body))
         return self._failing(rule, binding, failing, facts)
 
-    def _firing(self, rule: Rule, binding: Binding, how: str) -> WhyNot:
+    def _firing(self, rule: Rule, binding: Binding, *, is_known: bool) -> WhyNot:
+        """Tell with what a rule fires, if that is known, and what it concludes."""
+        bindings = matching.shown_bindings(binding, self.base.names) if is_known else ()
         said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
-        return WhyNot(rule.name, f"it fires{how}, and concludes {said}", fires=True)
+        words = f"it fires{with_bindings(bindings)}, and concludes {said}"
+        return WhyNot(rule.name, words, fires=True)
 
     def _why_never(self, rule: Rule) -> str | None:
         """Why a rule fires in no state, by the first problem in its text; None: there is none."""
@@ -577,11 +579,8 @@ class RuleQuestions:
             known = self._followed(rules, state)
             facts = Facts(known)
             firing = {rule for rule in rules if matching.matches(rule, facts)}
-        for rule in rules:
-            asks = any(atom.predicate in IDENTITIES for atom in rule.body)
-            if asks and rule not in firing and self._adds(rule, state, known):
-                firing.add(rule)
-        return facts, frozenset(firing)
+        more = (rule for rule in rules if rule not in firing and self._adds(rule, state, known))
+        return facts, frozenset([*firing, *more])
 
     def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
         """All that follows in a state with some of the rules."""
@@ -594,6 +593,8 @@ class RuleQuestions:
         It may fire with no match that is known: where an individual differs from one of two, but
         from which does not follow.
         """
+        if not any(atom.predicate in IDENTITIES for atom in rule.body):
+            return False
         rules = self._usable.content.enabled_rules
         fewer = self._followed((each for each in rules if each is not rule), state)
         more = set(known).difference(fewer)
@@ -847,9 +848,7 @@ class Explainer:
             if design in self.base.designs(name):
                 return name
         known = [each for name in self.base.functions for each in self.base.designs(name)]
-        raise InputError(
-            f"there is no function design {shown(design)}", remedy=did_you_mean(design, known)
-        )
+        raise unknown(f"there is no function design {shown(design)}", design, known)
 
     def decision(self, decision: Decision, asked: str | None = None) -> tuple[str, ...]:
         """Why a decision is made: the answer, which begins with the design that was asked about,

@@ -89,10 +89,15 @@ class Policy:
             cases = self.marked(mark)
             yield f"{mark}: {number_of(int(cases['states'].sum()), 'state')}"
             if mark != NONE_LEFT:
-                for each in cases[:_EXAMPLES].to_dict("records"):
-                    yield f"  {each['state']}" + (f": {each['problem']}" if each["problem"] else "")
-                if len(cases) > _EXAMPLES:
-                    yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
+                yield from _examples(cases)
+
+
+def _examples(cases: pandas.DataFrame) -> Iterator[str]:
+    """A state of some cases each, with what contradicts what in it."""
+    for each in cases[:_EXAMPLES].to_dict("records"):
+        yield f"  {each['state']}" + (f": {each['problem']}" if each["problem"] else "")
+    if len(cases) > _EXAMPLES:
+        yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
 
 
 def make_policy(
@@ -111,13 +116,14 @@ def make_policy(
         decide: concludes anew, for contradictions, which are told with the values of the state.
     """
     every = list(states)
-    outcomes = [decided(Situation(state)) for state in every]
+    outcomes = list(map(decided, map(Situation, every)))
     cases = states.frame(every)
     add_decisions(cases, states, outcomes)
     # states that differ in their task only follow one another
-    here = range(0, len(every), len(states.tasks))
-    groups = (slice(first, first + len(states.tasks)) for first in here)
-    flipping = [each for group in groups for each in _flipping(every[group], outcomes[group])]
+    flipping: list[tuple[str, ...]] = []
+    for first in range(0, len(every), len(states.tasks)):
+        group = slice(first, first + len(states.tasks))
+        flipping += _flipping(every[group], outcomes[group])
     cases["marks"] = list(map(_marks, outcomes, flipping))
     cases["problem"] = [
         decide(Situation(state)).contradiction if outcome.reasoning is None else ""
@@ -203,32 +209,28 @@ def _in_words(reports: Reports, space: PolicySpace) -> str:
     return " + ".join(parts) or "no report"
 
 
-#: A table; the number of its columns that say what the case is; the measured attribute that goes
-# across, or "".
-FunctionTable = tuple[Table, int, str]
-
-
-def function_table(policy: Policy, function: str) -> FunctionTable:
+def function_table(policy: Policy, function: str) -> tuple[Table, int, str]:
     """Tabulate what happens to one function's grounding, without the dimensions on which it does
     not depend.
 
     The last measured attribute goes across, all else down.
+
+    Returns:
+        the table; the number of its columns that say what the case is; the attribute that goes
+        across, or "".
     """
-    own = f"{function}_now"
     cases, kept = _needed(policy, function)
     attributes = [name for name in policy.space.attributes if name in kept]
-    down = [name for name in kept if name not in attributes]
-    others = [name for name in down if name not in (own, "reports")]
+    down = kept[: len(kept) - len(attributes)]
     found = _outcomes(cases, kept, len(down))
     ranges = [_ranges(number, policy, found.values()) for number in range(len(attributes))]
-    merged = _merged(found, down, [own, *others], ranges)
-    headings = ["now", *(name.removesuffix("_now") for name in others)]
-    if "reports" in kept:
-        headings.append("components")
-        rows = [[*now, ", ".join(said), *at, *then] for (now, at, then), said in merged.items()]
-    else:
-        rows = [[*now, *at, *then] for now, at, then in merged]
-    headings += attributes[:-1]
+    merged = _merged(found, len(down) - down.count("reports"), ranges)
+    rows = [
+        [*now, *map(", ".join, zip(*reports, strict=True)), *at, *then]
+        for (now, at, then), reports in merged.items()
+    ]
+    names = {f"{function}_now": "now", "reports": "components"}
+    headings = [names.get(name, name.removesuffix("_now")) for name in down] + attributes[:-1]
     if attributes:
         across = attributes[-1]
         outcomes = [words for _, words in ranges[-1]]
@@ -241,39 +243,38 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
 
 def _merged(
     found: Mapping[tuple[str, ...], _Row],
-    down: Sequence[str],
-    designs: Sequence[str],
+    designs: int,
     ranges: Sequence[Sequence[tuple[int, str]]],
-) -> dict[Any, list[str]]:
-    """What components report in each different row: designs, words for places, and outcomes."""
+) -> dict[Any, list[tuple[str, ...]]]:
+    """What components report, if that matters, in each different row: designs, of which there are
+    so many, words for places, and outcomes.
+    """
     *over, across = ranges or [[]]
-    merged: dict[Any, list[str]] = {}
+    merged: dict[Any, list[tuple[str, ...]]] = {}
     for names, row in found.items():
-        known = dict(zip(down, names, strict=True))
-        before = tuple(known[name] for name in designs)
         for at in itertools.product(*over):
             places = [first for first, _ in at]
             cells = [row[*places, last] for last, _ in across] or [row[()]]
-            label = before, tuple(words for _, words in at), tuple(cells)
-            merged.setdefault(label, []).append(known.get("reports", ""))
+            label = names[:designs], tuple(words for _, words in at), tuple(cells)
+            merged.setdefault(label, []).append(names[designs:])
     return merged
 
 
 def _needed(policy: Policy, function: str) -> tuple[Any, list[str]]:
     """The cases in which a function has an objective, with their outcome, and the dimensions on
-    which that depends.
+    which that depends: designs, its own first, reports, and measured attributes.
     """
     own = f"{function}_now"
-    groundings = [f"{name}_now" for name in policy.functions]
+    groundings = list(dict.fromkeys((own, *(f"{name}_now" for name in policy.functions))))
     cases: Any = policy.cases[policy.cases[own] != ""].copy()
     flips = [f" ({FLIP_FLOP})" if function in flipping else "" for flipping in cases["flipping"]]
     cases["outcome"] = cases[f"{function}_then"] + flips
     cases[groundings] = cases[groundings].replace("", "no objective")
     kept = [*groundings, "reports", *policy.space.attributes]
-    for dimension in list(kept):
+    for dimension in kept[1:]:
         fewer = [each for each in kept if each != dimension]
         outcomes = cases[[*fewer, "outcome"]].drop_duplicates()
-        if dimension != own and not outcomes.duplicated(fewer).any():
+        if not outcomes.duplicated(fewer).any():
             kept = fewer
             cases = outcomes
     return cases, kept

@@ -17,7 +17,7 @@ import yaml
 from lxml import etree
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.errors import InputError, KnowledgeError, shown, unknown
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.scale import TestedRegion, measurements_in, parse_region
@@ -27,7 +27,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.rdf import Triple, fact_of
 from suave_des.knowledge.reasoner import regions_of
-from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
+from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState, exact
 from suave_des.records.mission_folder import RecordedKnowledge
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 from suave_des.scenario.yamlfile import Layer, read_yaml, validated
@@ -183,14 +183,11 @@ def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str,
 
 def _choice(base: Ontology, function: str, words: str) -> str:
     if function not in base.functions:
-        raise InputError(
-            f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions)
-        )
-    known, choice = (*base.designs(function), STAYS, NONE_LEFT), words.strip()
+        raise unknown(f"there is no function {shown(function)}", function, base.functions)
+    known = (*base.designs(function), STAYS, NONE_LEFT)
+    choice = words.strip()
     if choice not in known:
-        raise InputError(
-            f"{function} has no function design {shown(choice)}", remedy=did_you_mean(choice, known)
-        )
+        raise unknown(f"{function} has no function design {shown(choice)}", choice, known)
     return choice
 
 
@@ -201,7 +198,7 @@ def _states(
     builder = StateBuilder(knowledge.base, knowledge.settings)
     if given.mission is not None and given.at_s is not None:
         builder.add_state(recorded_state(folder / given.mission, given.at_s, given.run))
-    elif given.mission is not None or given.at_s is not None:
+    elif (given.mission, given.at_s) != (None, None):
         raise InputError(
             "mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7"
         )
@@ -211,12 +208,16 @@ def _states(
         builder.add(kind, name, value if region is None else 0)
         if region is not None:
             regions[name] = region
+    state = builder.state()
     for values, words in measurements_in(knowledge.base, regions):
-        for name, value in values.items():
-            builder.parts["measurements"].pop(name, None)
-            if value is not None:
-                builder.add("measurements", name, value)
-        yield builder.state(), words
+        yield _measuring(state, values), words
+
+
+def _measuring(state: KnowledgeState, values: Mapping[str, Decimal | None]) -> KnowledgeState:
+    """A state with other measured values; None: it is not measured."""
+    every = sorted({**dict(state.measurements), **values}.items())
+    known = ((name, exact(value)) for name, value in every if value is not None)
+    return replace(state, measurements=tuple(known))
 
 
 @dataclass(frozen=True)
@@ -276,10 +277,16 @@ def _unmet(
     except KnowledgeError as error:
         yield f"the state cannot be decided: {error}", None
         return
-    if outcome.reasoning is None:
-        if not test.contradicts:
-            yield f"the situation contradicts itself: {outcome.contradiction}", None
-        return
+    if outcome.reasoning is not None:
+        yield from _unmet_by(test, situation.state, outcome)
+    elif not test.contradicts:
+        yield f"the situation contradicts itself: {outcome.contradiction}", None
+
+
+def _unmet_by(
+    test: RuleTest, state: KnowledgeState, outcome: Outcome
+) -> Iterator[tuple[str, Fact | str | None]]:
+    """Each expectation that what follows and is decided in a state does not meet."""
     if test.contradicts:
         yield "the situation does not contradict itself", None
     for fact in test.follows:
@@ -290,10 +297,10 @@ def _unmet(
             yield f"{fact} follows", fact
     for function, wanted in test.decides.items():
         happens = outcome.choice(function)
-        as_wanted = {happens}
-        present = situation.state.grounded(function)
+        as_wanted = [happens]
+        present = state.grounded(function)
         if happens == STAYS and present:
-            as_wanted.add(present)
+            as_wanted.append(present)
             happens = f"{present} stays"
         if wanted not in as_wanted:
             yield f"{function}: {happens}, not {wanted}", function
@@ -342,23 +349,27 @@ def junit_xml(results: Sequence[TestResult]) -> bytes:
     for file in dict.fromkeys(result.test.file for result in results):
         own = [result for result in results if result.test.file == file]
         counts = {
-            "tests": len(own),
-            "failures": sum(not each.passed for each in own),
-            "errors": 0,
-            "skipped": 0,
+            "name": str(file),
+            "time": f"{sum(result.duration_s for result in own):.3f}",
+            "tests": str(len(own)),
+            "failures": str(sum(not each.passed for each in own)),
+            "errors": "0",
+            "skipped": "0",
         }
-        time_s = f"{sum(result.duration_s for result in own):.3f}"
-        suite = etree.SubElement(root, "testsuite", name=str(file), time=time_s)
-        suite.attrib.update({name: str(count) for name, count in counts.items()})
-        for result in own:
-            name, line = _clean(result.test.name), str(result.test.line)
-            parts = {"classname": str(file), "name": name, "file": str(file), "line": line}
-            case = etree.SubElement(suite, "testcase", parts, time=f"{result.duration_s:.3f}")
-            if not result.passed:
-                message = _clean("; ".join(what for what, *_ in result.failures))
-                text = _clean("\n".join(line for each in result.failures for line in each))
-                etree.SubElement(case, "failure", message=message).text = text
+        etree.SubElement(root, "testsuite", counts).extend(map(_case, own))
     return etree.tostring(root, xml_declaration=True, encoding="utf-8", pretty_print=True)
+
+
+def _case(result: TestResult) -> etree._Element:
+    test = result.test
+    parts = {"classname": str(test.file), "name": _clean(test.name), "file": str(test.file)}
+    parts |= {"line": str(test.line), "time": f"{result.duration_s:.3f}"}
+    case = etree.Element("testcase", parts)
+    if not result.passed:
+        message = _clean("; ".join(what for what, *_ in result.failures))
+        text = _clean("\n".join(line for each in result.failures for line in each))
+        etree.SubElement(case, "failure", message=message).text = text
+    return case
 
 
 def _clean(text: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
-from suave_des.errors import InputError, KeyPath, did_you_mean, nearest, shown
+from suave_des.errors import InputError, KeyPath, nearest, shown, unknown
 from suave_des.files import check_folder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
@@ -298,9 +298,7 @@ class StateBuilder:
         """
         known = self._known(kind)
         if name not in known:
-            raise InputError(
-                f"there is no {_NOUNS[kind]} {shown(name)}", remedy=did_you_mean(name, known)
-            )
+            raise unknown(f"there is no {_NOUNS[kind]} {shown(name)}", name, known)
         if kind == "measurements":
             _check_number(name, value)
             self.measured_since = None
@@ -315,19 +313,15 @@ class StateBuilder:
         if isinstance(value, str) and kind in _STATUSES:
             self._check_status(_STATUSES[kind], value)
         if kind == "groundings" and value not in self.base.designs(name):
-            remedy = did_you_mean(value, self.base.designs(name))
-            raise InputError(f"{name} has no function design {shown(value)}", remedy=remedy)
+            problem = f"{name} has no function design {shown(value)}"
+            raise unknown(problem, value, self.base.designs(name))
         self.parts[kind][name] = value
 
     def _known(self, kind: str) -> tuple[str, ...]:
         """Names that parts of a kind can have."""
-        base = self.base
-        model = base.model
-        return tuple(
-            {"components": model.components, "measurements": model.attributes}.get(
-                kind, model.functions
-            )
-        )
+        model = self.base.model
+        own = {"components": model.components, "measurements": model.attributes}
+        return tuple(own.get(kind, model.functions))
 
     def _check_status(self, property_name: str, value: str) -> None:
         """Reject a status that resembles one that a rule mentions, because nothing would follow
@@ -343,8 +337,8 @@ class StateBuilder:
             and not triggers_adaptation(value)
             and nearest(value.upper(), known) is not None
         ):
-            remedy = did_you_mean(value.upper(), sorted(known))
-            raise InputError(f"no rule mentions the {property_name} {shown(value)}", remedy=remedy)
+            problem = f"no rule mentions the {property_name} {shown(value)}"
+            raise unknown(problem, value.upper(), sorted(known))
 
     def _check_reported(self, value: str) -> None:
         """Reject a status from which nothing follows, unless a rule reads whatever it is."""
@@ -355,7 +349,7 @@ class StateBuilder:
         known = texts_of(atoms, C_STATUS).union(*REPORTED_STATUSES.values())
         if value not in known and not any(isinstance(term, Variable) for term in asked):
             problem = f"no rule mentions the c_status {shown(value)}, and nothing reports it"
-            raise InputError(problem, remedy=did_you_mean(value, sorted(known)))
+            raise unknown(problem, value, sorted(known))
 
     def add_file(self, path: Path) -> None:
         """Add the parts in a YAML file with the keys of StateContent.
@@ -408,7 +402,7 @@ class StateBuilder:
         if kind is None:
             known = dict.fromkeys(each for one in _NOUNS for each in self._known(one))
             problem = f"there is no quality attribute, component or function {shown(name)}"
-            raise InputError(problem, remedy=did_you_mean(name, known))
+            raise unknown(problem, name, known)
         if kind == "components":
             self._check_reported(value)
         is_status = kind == "groundings" and (value == UNGROUNDED or triggers_adaptation(value))

@@ -5,7 +5,7 @@ adaptation.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from itertools import accumulate
 from pathlib import Path
@@ -161,11 +161,6 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         function: [(span.begin_s, span.what) for span in spans]
         for function, spans in mode_spans(mission).items()
     }
-    thrusters: list[tuple[float, int, bool]] = []
-    for t_s, (component, status) in happenings(mission, ComponentStatus):
-        number = component.rpartition("_")[2]
-        if number.isdecimal():
-            thrusters.append((t_s, int(number), status != FAILED))
     events = mission.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (
@@ -176,7 +171,7 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         "metrics": metrics,
         "track": track.astype(object).where(track.notna(), None).to_dict("list"),
         "modes": modes,
-        "thrusters": thrusters,
+        "thrusters": list(_thruster_reports(mission)),
         "adaptations": sorted({each.t_s for each in adaptations(mission)}),
         "events": [(round(t_s, 2), *words) for t_s, *words in events],
         "inspected": _inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
@@ -184,6 +179,14 @@ def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
         "seen": None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
         "cycles": explain_cycles(mission),
     }
+
+
+def _thruster_reports(mission: MissionRecord) -> Iterator[tuple[float, int, bool]]:
+    """When thrusters were reported, with the number from 1, and whether it works."""
+    for t_s, (component, status) in happenings(mission, ComponentStatus):
+        number = component.rpartition("_")[2]
+        if number.isdecimal():
+            yield t_s, int(number), status != FAILED
 
 
 def _way(mission: MissionRecord) -> Array | None:
@@ -300,19 +303,17 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
         for names in (knowledge.ontologies, knowledge.rules)
     )
     base = read_base(mission.settings, ontologies, rules)
+    return base, _note_on_changes(mission, hashes((*ontologies, *rules)))
+
+
+def _note_on_changes(mission: MissionRecord, now: Mapping[str, str]) -> str:
+    """A note on which files have another digest now than they had in a mission; empty: none has."""
     before = {Path(name).name: digest for name, digest in mission.inputs.items()}
-    now = hashes((*ontologies, *rules))
-    changed = [
-        Path(name).name
-        for name, digest in now.items()
-        if before.get(Path(name).name, digest) != digest
-    ]
-    note = (
-        f"{', '.join(changed)} changed since the mission: decisions are explained with today's."
-        if changed
-        else ""
-    )
-    return base, note
+    today = {Path(name).name: digest for name, digest in now.items()}
+    changed = [name for name, digest in today.items() if before.get(name, digest) != digest]
+    if not changed:
+        return ""
+    return f"{', '.join(changed)} changed since the mission: decisions are explained with today's."
 
 
 class _Explainer:

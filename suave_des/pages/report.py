@@ -152,9 +152,8 @@ def chart_columns(missions: Missions) -> dict[str, Any]:
         "seed": seeds[:1] if len(set(seeds)) == 1 else seeds,
         "found": _plain(frame["pipeline_found"].astype(float)),
     }
-    charted = frame.columns.intersection(list(_CHARTED))
-    known = frame[charted].notna().any()
-    titles = {name: METRICS[name].heading for name in _CHARTED if known.get(name, False)}
+    charted = frame.reindex(columns=list(_CHARTED)).dropna(axis="columns", how="all")
+    titles = {name: METRICS[name].heading for name in map(str, charted)}
     columns |= {name: _plain(frame[name]) for name in (*titles, *missions.swept)}
     names = [each.name for each in groups]
     return {

@@ -90,7 +90,7 @@ def read_missions(paths: Sequence[Path], labels: Mapping[str, str] = _NO_LABELS)
     _check_each_once(paths)
     named = dict(zip(_short_names(paths), paths, strict=True))
     read = {name: _read_source(path) for name, path in named.items()}
-    _check_labels(labels, [each.frame for each in read.values()])
+    _check_labels(labels, read.values())
     sources = {name: _labelled(each, labels) for name, each in read.items()}
     frames = [each.frame.assign(source=name) for name, each in sources.items()]
     folders = {name: path for name, path in named.items() if (path / STORE_FILE).is_file()}
@@ -113,8 +113,8 @@ def _check_each_once(paths: Iterable[Path]) -> None:
         seen.add(real(path))
 
 
-def _check_labels(labels: Iterable[str], frames: Iterable[pandas.DataFrame]) -> None:
-    managers = dict.fromkeys(chain.from_iterable(frame["manager"] for frame in frames))
+def _check_labels(labels: Iterable[str], sources: Iterable[Missions]) -> None:
+    managers = dict.fromkeys(chain.from_iterable(each.frame["manager"] for each in sources))
     for name in labels:
         if name not in managers:
             raise unknown(f"there is no mission of {shown(name)}", name, managers, "there are")

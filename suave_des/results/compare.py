@@ -147,14 +147,14 @@ def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Gr
 def _pairs_against(groups: Sequence[Group], against: str) -> list[tuple[Group, Group]]:
     """Pair each with the group of that name, or with the one of that manager at its point."""
     by_name = {group.name: group for group in groups}
-    if against in by_name:
-        return [(group, by_name[against]) for group in groups if group.name != against]
     managers = dict.fromkeys(group.name.removesuffix(group.point) for group in groups)
-    if against not in managers:
+    if against not in by_name and against not in managers:
         raise unknown(
             f"nothing is called {shown(against)}", against, managers, "there are", "against"
         )
-    at_points = [(group, by_name.get(f"{against}{group.point}")) for group in groups]
+    at_points = [
+        (group, by_name.get(against, by_name.get(f"{against}{group.point}"))) for group in groups
+    ]
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
@@ -212,19 +212,27 @@ def _difference(
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
-    kinds = {first.counted, second.counted}
-    if metric.name == FOUND and kinds == {"mission"}:
-        row |= _shares_compared(x > 0.0, y > 0.0, is_paired=is_paired)
+    if metric.name == FOUND:
+        row |= _found_compared({first.counted, second.counted}, x, y, is_paired=is_paired)
     else:
         row |= _values_compared(x, y, is_paired=is_paired)
-    if metric.name == FOUND and kinds == {CONDITION} and is_paired:
-        row["difference"] = statistics.paired_share_difference(x, y)
-    elif metric.name == FOUND:
-        row["difference"] = row["difference"].cut(-1.0, 1.0)
     if math.isnan(row["difference"].value):
         return row
     usual = metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
     return row | _runs_needed(x, y, half_width or usual, is_paired=is_paired)
+
+
+def _found_compared(counted: set[str], x: Sample, y: Sample, *, is_paired: bool) -> dict[str, Any]:
+    """Compare in how many missions the pipeline was found, or in which share of a condition's."""
+    if counted == {"mission"}:
+        row = _shares_compared(x > 0.0, y > 0.0, is_paired=is_paired)
+    else:
+        row = _values_compared(x, y, is_paired=is_paired)
+    if counted == {CONDITION} and is_paired:
+        row["difference"] = statistics.paired_share_difference(x, y)
+    else:
+        row["difference"] = row["difference"].cut(-1.0, 1.0)
+    return row
 
 
 def _shares_compared(

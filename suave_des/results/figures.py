@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, number_of, shown, unknown
 from suave_des.estimates import Estimate, mean_of
-from suave_des.files import write_file
+from suave_des.files import check_ending, write_file
 from suave_des.records.metrics import METRICS, PAPER_METRICS, Metric
 from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
 from suave_des.records.missions import Missions, read_missions
@@ -84,28 +84,32 @@ def draw_distributions(drawn: Groups) -> style.Picture:
             axes.step(
                 [0.0, *values, end][: len(steps)], steps, where="post", label=_label(group), **look
             )
-            mark = {
-                "marker": style.marker(number),
-                "color": look["color"],
-                "ms": 5,
-                "mec": "white",
-                "mew": 0.5,
-            }
-            axes.plot(float(group.frame[metric].mean()), 0.0, clip_on=False, zorder=5, **mark)
+            axes.plot(
+                float(group.frame[metric].mean()),
+                0.0,
+                clip_on=False,
+                zorder=5,
+                marker=style.marker(number),
+                color=look["color"],
+                ms=5,
+                mec="white",
+                mew=0.5,
+            )
         axes.set(xlabel=title, xlim=(0.0, end))
     times = figure.axes[0]
     is_any_lost = any((group.frame[FOUND_BY_HORIZON] < 1.0).any() for group in groups)
     if is_any_lost and math.isfinite(drawn.time_limit_s):
         times.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-        note: dict[str, Any] = {
-            "color": "#555555",
-            "fontsize": 7,
-            "rotation": 90,
-            "ha": "right",
-            "va": "bottom",
-        }
         times.text(
-            drawn.time_limit_s, 0.03, "not found ", transform=times.get_xaxis_transform(), **note
+            drawn.time_limit_s,
+            0.03,
+            "not found ",
+            transform=times.get_xaxis_transform(),
+            color="#555555",
+            fontsize=7,
+            rotation=90,
+            ha="right",
+            va="bottom",
         )
     times.set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     times.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -189,32 +193,33 @@ def _draw_row_of_differences(
     axes.plot(rain, row + 0.08 + beside, "o", color=colour, ms=2.4, alpha=0.6, mew=0)
     found = mean_of(values.tolist())
     errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
-    look: dict[str, Any] = {
-        "fmt": "D",
-        "ms": 3,
-        "mfc": "white",
-        "mew": 0.8,
-        "elinewidth": 1.2,
-        "capsize": 2.5,
-    }
-    axes.errorbar(found.value, row - 0.1, xerr=errors, color="k", **look)
+    axes.errorbar(
+        found.value,
+        row - 0.1,
+        xerr=errors,
+        color="k",
+        fmt="D",
+        ms=3,
+        mfc="white",
+        mew=0.8,
+        elinewidth=1.2,
+        capsize=2.5,
+    )
     runs = apart.index.get_level_values("run").to_numpy(float)
     extremes = least_and_greatest(np.array(apart, dtype=np.float64), runs)
     ends = zip(extremes, (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
-        place: dict[str, Any] = {
-            "textcoords": "offset points",
-            "ha": side,
-            "va": "center",
-            "fontsize": 6.5,
-        }
-        # lest the line at 0 cross the label
-        place["bbox"] = {
-            "facecolor": "white",
-            "edgecolor": "none",
-            "pad": 0.5,
-        }
-        axes.annotate(f"run {run}", (value, row + 0.2), (shift, 0), **place)
+        axes.annotate(
+            f"run {run}",
+            (value, row + 0.2),
+            (shift, 0),
+            textcoords="offset points",
+            ha=side,
+            va="center",
+            fontsize=6.5,
+            # lest the line at 0 cross the label
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )
 
 
 def _metric_panels(figure: style.Picture) -> Iterator[tuple[Axes, str, str]]:
@@ -392,7 +397,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         lowest.set_xticks(range(len(columns)), _ticks(columns))
         lowest.set_yticks(range(len(rows)), _ticks(rows))
     figure.supylabel(_folded(key_words(up)), fontsize=panels[0, 0].yaxis.label.get_fontsize())
-    counts = [len(runs) for runs in cells.values()]
+    counts = list(map(len, cells.values()))
     _write_below(figure, f"{_averaged(frame, counts, others)}; ± half their 95% intervals")
     return figure
 
@@ -430,6 +435,9 @@ def _ticks(values: Sequence[object]) -> list[str]:
 
 
 def _chosen(missions: Missions, parameters: Sequence[str]) -> list[str]:
+    if not missions.swept:
+        problem = "nothing is swept in these results"
+        raise InputError(problem, place="kind", remedy="give a campaign with a sweep")
     parameters = list(parameters or missions.swept)
     check_swept(missions, parameters, "parameters")
     for source, part in missions.frame.groupby("source", sort=False):
@@ -626,9 +634,7 @@ def draw_results(
 
 def check_picture(out: Path) -> None:
     """Raise an InputError if a file has not the ending of a picture."""
-    if out.suffix.lower() not in ENDINGS:
-        problem = f"expected a picture, got {out.suffix or 'a file without an ending'}"
-        raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
+    check_ending(out, ENDINGS, "a picture")
 
 
 def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
@@ -680,18 +686,10 @@ def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str
     Raises:
         InputError: there is no such figure of a campaign, or the missions lack what it needs.
     """
-    if kind in (SWEEP, HEAT_MAP) or (kind == AUTO and missions.swept):
-        if not missions.swept:
-            raise InputError(
-                "nothing is swept in these results",
-                place="kind",
-                remedy="give a campaign with a sweep",
-            )
-        return (
-            draw_heat_map(missions, parameters)
-            if kind == HEAT_MAP
-            else draw_sweep(missions, parameters)
-        )
+    if kind == HEAT_MAP:
+        return draw_heat_map(missions, parameters)
+    if kind == SWEEP or (kind == AUTO and missions.swept):
+        return draw_sweep(missions, parameters)
     if parameters:
         raise InputError(
             "parameters are those of a sweep", place="parameters", remedy="leave them out"
@@ -701,7 +699,7 @@ def draw_missions(missions: Missions, kind: str = AUTO, parameters: Sequence[str
     groups = grouped(missions, averages=is_of_means)
     figure = draw_differences(groups) if is_of_means else draw_distributions(groups)
     if missions.swept:
-        swept = ", ".join(key_words(parameter) for parameter in missions.swept)
+        swept = ", ".join(map(key_words, missions.swept))
         shown_are = "means of each run over" if is_of_means else "missions at"
         _write_below(figure, f"{shown_are} all points of the sweep: {swept}")
     return figure

@@ -123,9 +123,11 @@ def grouped(
     check_swept(missions, by, "by")
     managers = [missions.labels.get(name, name) for name in managers]
     frame = at_horizons(of_managers(missions, managers), missions.swept, by)
-    averaged = [name for name in missions.swept if averages and name not in by]
-    alike = alike_by_source(frame) if averages else {}
+    averaged: list[str] = []
+    alike: dict[str, int] = {}
     if averages:
+        averaged = [name for name in missions.swept if name not in by]
+        alike = alike_by_source(frame)
         frame = frame.assign(**{_CLUSTER: _conditions(frame, missions.swept)})
     groups = []
     lacking: dict[str, list[str]] = defaultdict(list)

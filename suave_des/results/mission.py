@@ -144,24 +144,29 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
     modes = dict[str, str]()
     requested = events.name_of(events.ModeRequested)
     found = list[Adaptation]()
-    for t_s, event, detail in zip(
-        *(record.events[name] for name in ("t_s", "event", "detail")), strict=True
-    ):
+    for t_s, event, detail in record.events[["t_s", "event", "detail"]].itertuples(index=False):
         if event == requested and (change := events.read(events.ModeRequested, detail)):
             function, mode = change
             if function in in_use:
-                effect = events.ModeSet(*change)
-                effects_s = (at_s for at_s, new in mode_set if at_s >= t_s and new == effect)
-                effect_s = next(effects_s, t_s)
+                effect_s = _effect_s(mode_set, t_s, events.ModeSet(*change))
                 cause = _cause(record, function, modes[function], Span(effect_s, effect_s, mode))
                 found.append(Adaptation(effect_s, function, modes[function], mode, cause))
-            in_use |= {function} if mode != UNGROUND_MODE else set()
+            if mode != UNGROUND_MODE:
+                in_use.add(function)
             modes[function] = mode
         elif event == "task_done":
             in_use -= _functions_of(record, detail)
         elif event == "task_cancelled":  # at the mission's end, or after a leak: all functions end
             in_use.clear()
     return sorted(found, key=lambda each: each.t_s)
+
+
+def _effect_s(
+    changes: Iterable[tuple[float, events.ModeSet]], requested_s: float, change: events.ModeSet
+) -> float:
+    """Return when a mode that was requested took effect; the time of the request, if it did not."""
+    effects_s = (t_s for t_s, each in changes if t_s >= requested_s and each == change)
+    return next(effects_s, requested_s)
 
 
 def _functions_of(record: MissionRecord, task: str) -> set[str]:
@@ -462,14 +467,9 @@ def _draw_over_time(
     for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-        look: dict[str, Any] = {
-            "color": mark.colour,
-            "ha": "center",
-            "va": "top",
-            "bbox": box,
-            **_LETTER,
-        }
-        axes.text(mark.t_s, top * (1.0 - _LETTER_ROW_SHARE * row), mark.letter, **look)
+        height = top * (1.0 - _LETTER_ROW_SHARE * row)
+        look: dict[str, Any] = {"color": mark.colour, "bbox": box, **_LETTER}
+        axes.text(mark.t_s, height, mark.letter, ha="center", va="top", **look)
     axes.set(
         ylim=(0.0, top),
         xlim=(0.0, record.end_s),
@@ -531,11 +531,8 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
     lines = list(_lines(record))
     changes = adaptations(record)
     listed = changes[:_LISTED]
-    sentences = [_sentence(each, rules.get((each.t_s, each.function), ())) for each in listed]
-    longest = max(map(len, sentences), default=0)
-    if len(changes) > _LISTED:
-        sentences.append(f"and {len(changes) - _LISTED} more")
-    columns = 2 if len(listed) > 6 and longest <= _COLUMN_LETTERS else 1
+    sentences = _sentences(changes, rules)
+    columns = 2 if len(listed) > 6 and max(map(len, sentences)) <= _COLUMN_LETTERS else 1
     list_in = 0.17 * -(-len(sentences) // columns) + 0.1 if changes else 0.01
     level = battery_level(record)
     heights = [1.9, *([0.7] if level is not None else []), 0.24 * len(lines) + 0.2, list_in]
@@ -575,12 +572,14 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     if record.metrics["pipeline_found"]:
         axes.axvline(found_s, color=style.BLACK, lw=0.9)
         is_late = found_s > 0.8 * record.end_s
-        look: dict[str, Any] = {
-            "textcoords": "offset points",
-            "ha": "right" if is_late else "left",
-            "fontsize": 7,
-        }
-        axes.annotate("pipeline found", (found_s, 0.0), (-3 if is_late else 3, 3), **look)
+        axes.annotate(
+            "pipeline found",
+            (found_s, 0.0),
+            (-3 if is_late else 3, 3),
+            textcoords="offset points",
+            ha="right" if is_late else "left",
+            fontsize=7,
+        )
     axes.set_ylabel("altitude; visibility (m)")
     axes.set_ylim(0.0, axes.get_ylim()[1] * 1.12)  # with room for the letters above the curves
     axes.legend(
@@ -588,17 +587,17 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     )
     rows = _letter_rows([each.t_s for each in listed], 0.022 * record.end_s)
     for letter, each, row in zip(ascii_uppercase, listed, rows, strict=False):
-        place: dict[str, Any] = {
-            "xycoords": ("data", "axes fraction"),
-            "textcoords": "offset points",
-        }
-        place |= {
-            "ha": "center",
-            "va": "top",
-            "bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-        }
         axes.annotate(
-            letter, (each.t_s, 1.0), (0, -2 - 8 * row), fontsize=7, weight="bold", **place
+            letter,
+            (each.t_s, 1.0),
+            (0, -2 - 8 * row),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=7,
+            weight="bold",
+            ha="center",
+            va="top",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
         )
 
 
@@ -647,28 +646,35 @@ def _mode_colour(function: str, mode: str, colours: Mapping[str, str]) -> str:
 
 
 def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
-    """Draw a bar for each span; the texts of a line are in its bars or behind them, or, where one
-    has no room, all of them in a legend.
-    """
+    """Draw lines of bars, with a legend of those whose texts have no room."""
     end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
     legend: dict[str, str] = {}
     for row, (name, bars) in enumerate(lines):
-        for span, colour, _ in bars:
-            length_s = span.end_s - span.begin_s
-            edge: dict[str, Any] = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
-            axes.barh(row, length_s, _BAR, span.begin_s, color=colour, **edge)
-        texts = list(_bar_texts(bars, end_s))
-        if {label for label, *_ in texts} == {style.text(words) for *_, words in bars}:
-            for label, begin_s, ink in texts:
-                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
-                axes.text(begin_s, row, label, color=ink, clip_on=True, **look)
-        else:
+        if not _draw_bars(axes, row, bars, end_s):
             legend |= {style.text(f"{name}: {words}"): colour for _, colour, words in bars}
     if legend:
         _show_colours(axes, legend)
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
+
+
+def _draw_bars(axes: Axes, row: int, bars: Sequence[tuple[Span, str, str]], end_s: float) -> bool:
+    """Draw a bar for each span, and the texts in them or behind them if there is room for each.
+
+    Returns:
+        whether there is.
+    """
+    look: dict[str, Any] = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
+    for span, colour, _ in bars:
+        axes.barh(row, span.end_s - span.begin_s, _BAR, span.begin_s, color=colour, **look)
+    texts = list(_bar_texts(bars, end_s))
+    if {label for label, *_ in texts} != {style.text(words) for *_, words in bars}:
+        return False
+    look = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3, "clip_on": True}
+    for label, begin_s, ink in texts:
+        axes.text(begin_s, row, label, color=ink, **look)
+    return True
 
 
 def _show_colours(axes: Axes, colours: Mapping[str, str]) -> None:
@@ -709,8 +715,23 @@ def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:
     for place, text in enumerate(sentences):
         column, row = divmod(place, rows)
         letter = "" if place >= _LISTED else f"{ascii_uppercase[place]}  "
-        look: dict[str, Any] = {"va": "top", "fontsize": 6.5, "transform": axes.transAxes}
-        axes.text(column / columns, 1.0 - row / rows, style.text(letter + text), **look)
+        axes.text(
+            column / columns,
+            1.0 - row / rows,
+            style.text(letter + text),
+            va="top",
+            fontsize=6.5,
+            transform=axes.transAxes,
+        )
+
+
+def _sentences(changes: Sequence[Adaptation], rules: Rules) -> list[str]:
+    """Write the first adaptations as text, and how many more there are."""
+    found = [
+        _sentence(each, rules.get((each.t_s, each.function), ())) for each in changes[:_LISTED]
+    ]
+    more = len(changes) - _LISTED
+    return [*found, f"and {more} more"] if more > 0 else found
 
 
 def _sentence(each: Adaptation, rules: Sequence[str]) -> str:

@@ -166,18 +166,18 @@ def key_words(key: str) -> str:
     unit = next((ending for ending in _UNITS if parts and parts[-1].endswith(ending)), "")
     if unit:
         parts[-1] = parts[-1].removesuffix(unit)
-    words = []
-    for part in parts:
-        name, _, index = part.partition("[")
-        words.append(
-            _FUNCTIONS.get(name, name).replace("_", " ")
-            + (f" {int(index[:-1]) + 1}" if index else "")
-        )
-        if part.isdecimal():
-            words[-1] = str(int(part) + 1)
-    text = re.sub(r": (\d+)(?=:|$)", r" \1", ": ".join(words))
+    text = re.sub(r": (\d+)(?=:|$)", r" \1", ": ".join(map(_part_words, parts)))
     text = text.replace("thruster events", "thruster event")
     return f"{text}\N{NO-BREAK SPACE}({_UNITS[unit]})" if unit else text
+
+
+def _part_words(part: str) -> str:
+    """Return what a part of a key is called; numbers in it, which are from 0, are from 1 then."""
+    if part.isdecimal():
+        return str(int(part) + 1)
+    name, _, index = part.partition("[")
+    words = _FUNCTIONS.get(name, name).replace("_", " ")
+    return f"{words} {int(index[:-1]) + 1}" if index else words
 
 
 def value_words(value: object) -> str:

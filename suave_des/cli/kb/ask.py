@@ -5,7 +5,7 @@ decided.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -29,7 +29,7 @@ from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
-    from suave_des.knowledge.state import Fact, Reasoning, Value
+    from suave_des.knowledge.state import Fact, KnowledgeState, Reasoning, Value
 
 
 TableFormat = Literal["text", "csv", "json"]
@@ -38,29 +38,44 @@ TableFormat = Literal["text", "csv", "json"]
 def infer(options: ReasonerOptions, at: At = None) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     knowledge = options.knowledge()
-    state = state_at(at, knowledge)
+    state = state_at(at, knowledge.base, knowledge.settings)
     _tell_of_identities(knowledge.base)
     lines = _inference_lines(knowledge.infer(state), knowledge.identities(state))
     print(*lines, sep="\n")
 
 
-def _tell_of_identities(base: Ontology, names: Iterable[str] = ()) -> None:
+def _tell_of_identities(base: Ontology, names: Collection[str] = ()) -> None:
     """Say of which rules, by default of all, the inferences may not be the same each time."""
     from suave_des.knowledge.rules import NOT_THE_SAME, write_atom
 
-    chosen = set(names)
     for rule in base.content.enabled_rules:
-        atoms = rule.identities_of_names if not chosen or rule.name in chosen else ()
-        for atom in atoms:
-            errors().print(f"suave-des: rule {rule.name}: {write_atom(atom)} {NOT_THE_SAME}")
+        if not names or rule.name in names:
+            for atom in rule.identities_of_names:
+                errors().print(f"suave-des: rule {rule.name}: {write_atom(atom)} {NOT_THE_SAME}")
 
 
 def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterator[str]:
+    yield "state"
+    yield from _state_lines(reasoning.inference.state)
+    yield "inferred"
+    facts = sorted(map(str, (*reasoning.inference.facts, *identities)))
+    yield from (f"  {fact}" for fact in facts or ["nothing"])
+    yield "plan"
+    grounded = reasoning.inference.state.grounded
+    if not reasoning.plan.decisions:
+        yield "  nothing to adapt"
+    for decision in reasoning.plan.decisions:
+        design = decision.design or "no design left"
+        if decision.design and decision.design == grounded(decision.function):
+            design = f"{design} stays"
+        yield f"  {decision.function}: {design}  ({decision.reason})"
+        for rejection in decision.rejected:
+            yield f"    not {rejection.design}: {rejection.reason}"
+
+
+def _state_lines(state: KnowledgeState) -> Iterator[str]:
     from suave_des.knowledge.state import value_text
 
-    state = reasoning.inference.state
-    decisions = reasoning.plan.decisions
-    yield "state"
     for objective in state.objectives:
         status = f"  {objective.status}" if objective.status else ""
         yield f"  objective   {objective.function}{status}"
@@ -72,19 +87,6 @@ def _inference_lines(reasoning: Reasoning, identities: Iterable[Fact]) -> Iterat
     }
     for kind, pairs in parts.items():
         yield from (f"  {kind:<10}  {name} = {value_text(value)}" for name, value in pairs)
-    yield "inferred"
-    facts = sorted(map(str, (*reasoning.inference.facts, *identities)))
-    yield from (f"  {fact}" for fact in facts or ["nothing"])
-    yield "plan"
-    if not decisions:
-        yield "  nothing to adapt"
-    for decision in decisions:
-        design = decision.design or "no design left"
-        if decision.design is not None and decision.design == state.grounded(decision.function):
-            design = f"{design} stays"
-        yield f"  {decision.function}: {design}  ({decision.reason})"
-        for rejection in decision.rejected:
-            yield f"    not {rejection.design}: {rejection.reason}"
 
 
 def explain(
@@ -101,7 +103,8 @@ def explain(
     """Explain why a fact follows, or why a design is chosen or not."""
     knowledge = options.knowledge()
     _tell_of_identities(knowledge.base)
-    print(knowledge.explain(state_at(at, knowledge), question))
+    state = state_at(at, knowledge.base, knowledge.settings)
+    print(knowledge.explain(state, question))
 
 
 def policy(
@@ -156,7 +159,7 @@ def query(
     Without --at only the ontologies are queried.
     """
     knowledge = options.knowledge()
-    state = state_at(at, knowledge) if at else None
+    state = state_at(at, knowledge.base, knowledge.settings) if at else None
     late = f"answering the query: not done after {options.time_limit:g} s (allow more with --time-limit)"
     with ends_at_once(options.time_limit, late):
         found = knowledge.query(text, state, inferred=inferred)
@@ -192,23 +195,23 @@ def why_not(
     The exit status is 0 even if a rule fires.
     """
     from suave_des.kb.explain import RuleQuestions
-    from suave_des.kb.states import FactReader, ManagingSettings, StateBuilder
+    from suave_des.kb.states import FactReader, ManagingSettings
     from suave_des.knowledge.pellet import TimeLimit
     from suave_des.scenario_knowledge import open_base
 
     loaded = options.loaded()
     base = open_base(loaded)
     reader = FactReader(base)
-    reader.declare(facts or ())
-    questions = RuleQuestions(base.with_facts(map(reader.triple, facts or ())))
-    builder = StateBuilder(questions.base, ManagingSettings.of(loaded.scenario))
-    builder.add_words(at or ())
-    state = builder.state()
-    _tell_of_identities(questions.base, names or ())
+    facts = facts or []
+    reader.declare(facts)
+    questions = RuleQuestions(base.with_facts(map(reader.triple, facts)))
+    state = state_at(at, questions.base, ManagingSettings.of(loaded.scenario))
+    names = names or []
+    _tell_of_identities(questions.base, names)
     limit = TimeLimit(time_limit, "--time-limit")
     answers = [
         limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")
         for name in names or sorted({rule.name for rule in questions.base.rules})
     ]
-    answers = [answer for answer in answers if names or not answer.fires]
-    print("\n".join(map(str, answers)) or "all rules fire")
+    told = [str(answer) for answer in answers if names or not answer.fires]
+    print("\n".join(told) or "all rules fire")

@@ -6,7 +6,7 @@ What reads ontologies or starts Java is imported when a command runs, so that he
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -234,9 +234,9 @@ def diff(
     from suave_des.kb.difference import compare_axioms
     from suave_des.kb.table_difference import compare_deciders
 
-    tables = [manager_of(file) for file in (one, other)]
+    tables = list(map(manager_of, (one, other)))
     both = [_side(options, file) for file in (one, other)]
-    changed = list[str]()
+    lines = list[str]()
     with counted("states", errors()) as on_count:
         if any(tables):
             deciders = [_decider(options, file) for file in (one, other)]
@@ -244,21 +244,23 @@ def diff(
             difference = compare_deciders(base, deciders, max_failed, on_count)
         else:
             before, after = (each.knowledge() for each in both)
-            removed, added = compare_axioms(before.base, after.base)
-            changed += [f"  - {text}" for text in removed]
-            changed += [f"  + {text}" for text in added]
+            lines += _changed_axioms(*compare_axioms(before.base, after.base))
             difference = before.diff(after, max_failed, on_count)
     missions = None
     if mission_options.missions is not None:
         missions = _compared_missions(both, tables, mission_options)
-    if changed:
-        print(f"axioms and rules: {len(removed)} removed, {len(added)} added")
-        print(*changed, sep="\n")
-    print(*difference.lines(), sep="\n")
+    print(*lines, *difference.lines(), sep="\n")
     if missions is not None:
         print()
         print(shown(missions[0].table(difference)))
         print(*missions[1], sep="\n")
+
+
+def _changed_axioms(removed: Sequence[str], added: Sequence[str]) -> Iterator[str]:
+    if removed or added:
+        yield f"axioms and rules: {len(removed)} removed, {len(added)} added"
+    yield from (f"  - {text}" for text in removed)
+    yield from (f"  + {text}" for text in added)
 
 
 def _side(options: ReasonerOptions, file: Path) -> ReasonerOptions:

@@ -17,6 +17,8 @@ from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.kb.knowledge_base import KnowledgeBase
+    from suave_des.kb.states import ManagingSettings
+    from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.scenario.loader import LoadedScenario
 
@@ -90,11 +92,13 @@ At = Annotated[
 ]
 
 
-def state_at(at: Iterable[str] | None, knowledge: KnowledgeBase) -> KnowledgeState:
+def state_at(
+    at: Iterable[str] | None, base: Ontology, settings: ManagingSettings
+) -> KnowledgeState:
     """Build the state that the words of --at describe; later ones replace earlier ones."""
     from suave_des.kb.states import StateBuilder
 
-    builder = StateBuilder(knowledge.base, knowledge.settings)
+    builder = StateBuilder(base, settings)
     builder.add_words(at or ())
     return builder.state()
 

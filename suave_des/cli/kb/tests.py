@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
+from itertools import chain, groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +18,7 @@ from rich.text import Text
 from suave_des.cli.console import counted, errors, output
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS, shown
 from suave_des.cli.options import KnowledgeFiles
-from suave_des.errors import InputError, did_you_mean, number_of
+from suave_des.errors import InputError, number_of, unknown
 from suave_des.errors import shown as quoted
 from suave_des.files import check_output_file, write_files
 from suave_des.resources import shipped_folder
@@ -156,10 +156,12 @@ def test(
     if coverage:
         _cover(suites, mutation.max_failed, write)
     all_passed = all(result.passed for result in results)
-    if mutation.is_wanted and all_passed:
-        _mutate(console, suites, mutation)
-    elif mutation.is_wanted:
-        console.print("no mutation testing while a test fails: every mutant would count as killed")
+    if mutation.is_wanted:
+        if all_passed:
+            _mutate(console, suites, mutation)
+        else:
+            why = "every mutant would count as killed"
+            console.print(f"no mutation testing while a test fails: {why}")
     if not all_passed:
         raise typer.Exit(FAILED)
 
@@ -279,7 +281,7 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
             "the tests are about several knowledge bases", place="--write", remedy=remedy
         )
     for about, knowledge, tests in suites:
-        situations = [situation for test in tests for situation in test.situations]
+        situations = chain.from_iterable(test.situations for test in tests)
         hint = ", fewer with --max-failed 0" if max_failed else ""
         with counted(f"states{hint}", errors()) as on_count:
             found = measure_coverage(knowledge, situations, max_failed, on_count)
@@ -303,8 +305,7 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
         names = list(dict.fromkeys(mutant.name for mutant in found))
         for name in options.only or ():
             if name not in names:
-                problem = f"there is no mutant of {quoted(name)}"
-                raise InputError(problem, place="--only", remedy=did_you_mean(name, names))
+                raise unknown(f"there is no mutant of {quoted(name)}", name, names, place="--only")
         only = options.only or names
         chosen = sample([mutant for mutant in found if mutant.name in only], options.mutants)
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
