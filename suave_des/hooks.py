@@ -114,6 +114,18 @@ def times_of(manager: ManagingSubsystem) -> tuple[float, float] | None:
     return period_s, starts_s
 
 
+def reading_time_of(manager: ManagingSubsystem) -> float:
+    """Return for how long a call of `adapt` reads measured values.
+
+    Raises:
+        ValueError: it is no such time.
+    """
+    reads_for_s = manager.reads_for_s
+    if isinstance(reads_for_s, Real) and reads_for_s >= 0.0:
+        return float(reads_for_s)
+    raise ValueError(f"reads_for_s is {shown(reads_for_s)}; it must be a number of at least 0")
+
+
 def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
     """Return what a manager's class itself declares to depend on: one derived from it may depend on
     more.

@@ -127,7 +127,7 @@ class System:
         """Add a knowledge state that is reasoned about to the mission's record, in place of what was
         added at the time at which the reasoning began; None: now.
         """
-        self._recorder.log_state(state, self.now_s if began_s is None else began_s)
+        self._recorder.log_state(state, began_s)
 
     def stream(self, name: str) -> random.Random:
         """Make a named random stream of this run, the same for every manager."""

@@ -23,12 +23,15 @@ from suave_des.domain import (
     UNGROUND_MODE,
     WATER_VISIBILITY,
 )
+from suave_des.errors import InputError
 from suave_des.managing.base import Dependencies, System
 from suave_des.managing.simple import RemembersFailures
+from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import draw
 
 ON_THE_WAY = "normal"
 """Mode in which the vehicle goes to the recharge station."""
+ARRIVED = "inactive"
 
 
 def least_that_reaches(threshold: float) -> float:
@@ -226,6 +229,15 @@ class ExtendedBehaviourTree(BehaviourTree):
 
     decides_on = (*BehaviourTree.decides_on, GENERATE_RECHARGE_PATH)
 
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """Check that the way to the station has its modes, if there is a battery."""
+        for mode in (ON_THE_WAY, ARRIVED):
+            is_there = loaded.modes.get(GENERATE_RECHARGE_PATH, mode) is not None
+            if loaded.scenario.battery is not None and not is_there:
+                problem = f"{GENERATE_RECHARGE_PATH} has no mode {mode!r}, which it requests"
+                raise InputError(problem, place=loaded.modes.source, remedy="add it")
+
     @property
     def depends_on(self) -> Dependencies:
         """The conditions of bt, and whether the battery is low."""
@@ -239,7 +251,7 @@ class ExtendedBehaviourTree(BehaviourTree):
         # The exemplar's tree has a sequence under a fallback, which ticks its running child again
         # without asking the guard on the level: the sequence goes on to its last step.
         go = (self._is_low(), self._set(GENERATE_RECHARGE_PATH, ON_THE_WAY))
-        end = (self._is_on_the_way(), self._set(GENERATE_RECHARGE_PATH, "inactive"))
+        end = (self._is_on_the_way(), self._set(GENERATE_RECHARGE_PATH, ARRIVED))
         steps = Behaviour("->", "recharge", go), Behaviour("->", "recharged", end)
         recharging = Behaviour("?", GENERATE_RECHARGE_PATH, steps)
         return Behaviour("=>", "mission", (*self._branches(), recharging))

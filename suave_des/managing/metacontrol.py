@@ -112,6 +112,8 @@ class Metacontrol(ManagingSubsystem):
         # are not cached.
         methods = type(self).analyze, type(self).plan
         self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
+        # What another analyze makes of the measured values is not known here.
+        self._plans_by_now = methods[0] is Metacontrol.analyze
         cached = _cached.setdefault(self._reasoner, {}).setdefault(revision, {})
         self._reasonings: dict[Hashable, Reasoning] = cached if self._is_cacheable else {}
         self.objectives: dict[str, str | None] = {}
@@ -407,7 +409,7 @@ class Metacontrol(ManagingSubsystem):
         """
         self.monitor()
         measured_now = self._measured_key()
-        if measured_now == measured_before and self._is_cacheable:
+        if measured_now == measured_before or not self._plans_by_now:
             return reasoning
         key = reasoning.inference.state, measured_now
         found = self._reasonings.get(key)
@@ -436,12 +438,13 @@ class Metacontrol(ManagingSubsystem):
         return known, self._measured_key()
 
     def _measured_key(self) -> Hashable:
-        """Make the key of the measured values: their regions, or, if the mission is recorded, the
-        values.
+        """Make the key of the measured values: their regions, or, if the mission is recorded or what
+        follows may depend on more, the values.
         """
         measured = self.measurements.values()
-        values = tuple(measured) if self.system.recorded else self._reasoner.distinguished(measured)
-        return tuple(self.measurements), values
+        if self.system.recorded or not self._is_cacheable:
+            return tuple(self.measurements), tuple(measured)
+        return tuple(self.measurements), self._reasoner.distinguished(measured)
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""

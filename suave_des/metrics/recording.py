@@ -55,16 +55,17 @@ class Recorder:
         if self.enabled:
             self.events.append(Event(float(self.env.now), source, *texts_of(happening)))
 
-    def log_state(self, state: KnowledgeState, began_s: float) -> None:
-        """Keep a state that is reasoned about, if it differs from the one before, in place of the
-        one of the same time.
+    def log_state(self, state: KnowledgeState, began_s: float | None) -> None:
+        """Keep a state that is reasoned about, if it differs from the one before: of now, or in
+        place of the one of an earlier time.
         """
         if not self.enabled:
             return
-        if self.knowledge and self.knowledge[-1].t_s == began_s:
+        if began_s is not None and self.knowledge and self.knowledge[-1].t_s == began_s:
             self.knowledge.pop()
         if not self.knowledge or self.knowledge[-1].state != state:
-            self.knowledge.append(KnowledgeRecord(began_s, state))
+            t_s = float(self.env.now) if began_s is None else began_s
+            self.knowledge.append(KnowledgeRecord(t_s, state))
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Keep a component's report, or the first value and the crossings of a measured quality

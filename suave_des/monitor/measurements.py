@@ -137,6 +137,11 @@ class Measurements:
             key, signal, timing, times.tolist(), numbers, (times, values[changes]), sent_s
         )
 
+    @property
+    def may_change(self) -> bool:
+        """Whether something may be published that is not yet in the table."""
+        return False
+
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t."""
         return bisect_right(self.times_s, t_s)
@@ -211,6 +216,7 @@ class BatteryMeasurements(Measurements):
 
     Attributes:
         recharges: how often it was recharged so far.
+        may_be_recharged: whether the function is active that recharges it.
         listeners: each is called when it has been recharged.
     """
 
@@ -225,11 +231,17 @@ class BatteryMeasurements(Measurements):
         super().__init__(BATTERY_LEVEL, self.level, timing, [], [], (np.empty(0), np.empty(0)))
         self._discharge_time_s, self._disturbances = discharge_time_s, (noise, is_lost)
         self._full_at_s, self.recharges = 0.0, 0
+        self.may_be_recharged = False
         self.listeners: list[Callable[[], None]] = []
         periods_s = np.full(timing.count(duration_s) - 1, timing.period_s)
         self._ticks_s: Array = np.add.accumulate(np.append(timing.phase_s, periods_s))
         self._used = timing.period_s / discharge_time_s
         self._measure(self._ticks_s, 1.0 - self._used)
+
+    @property
+    def may_change(self) -> bool:
+        """Whether it may be recharged."""
+        return self.may_be_recharged
 
     def level(self, t_s: float) -> float:
         """Compute the true level at mission time t, if it is not recharged until then."""

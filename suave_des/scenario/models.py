@@ -1245,7 +1245,8 @@ class Scenario(Strict):
         """Yield what changes no mission, and why, in words: a failure that comes too early, or what
         comes too late.
         """
-        effective_s = self.revision.thruster_failures.effective_from_s
+        failures = self.revision.thruster_failures
+        effective_s = failures.effective_from_s
         times_s: dict[str, float] = {}
         spans_s = zip(self.thruster_events, self._event_spans_s(), strict=True)
         for number, (event, (earliest_s, latest_s)) in enumerate(spans_s):
@@ -1253,6 +1254,9 @@ class Scenario(Strict):
             if event.event == "failure" and latest_s <= effective_s:
                 key = "revision.thruster_failures.effective_from_s"
                 yield f"thruster_events.{number}: failures have no effect before {effective_s:g} s ({key})"
+            elif event.event == "failure" and failures.loss_probability == 1.0:
+                key = "revision.thruster_failures.loss_probability"
+                yield f"thruster_events.{number}: each failure is lost ({key} is 1)"
         for name, each in self.signals.items():
             if each.kind == "step":
                 times_s[f"signals.{name}"] = support(each.time_s)[0]

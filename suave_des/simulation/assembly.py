@@ -352,6 +352,7 @@ def _make_host(order: Order, around: Surroundings, managed: Managed) -> ManagerH
     host = ManagerHost(order.manager_type, system, around.bus, around.error_of, learned, training)
     if around.battery is not None:
         around.battery.listeners.append(host.state_changed)
+        managed.mode_manager.listeners.append(lambda *_: host.state_changed())
     return host
 
 

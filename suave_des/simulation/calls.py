@@ -52,8 +52,13 @@ class CallTimes:
         self._next_s = first_s  # the first of its times after the last call
         self._sleeps = False
         self._known: set[tuple[int, ...]] = set()  # regions in which a call has changed nothing
-        self._alarm = Alarm(env, call)
+        self._call = call
+        self._alarm = Alarm(env, self._ring)
         self._alarm.set(first_s)
+
+    def _ring(self) -> None:
+        self._sleeps = False
+        self._call()
 
     def wake(self) -> None:
         """Note that the manager's state has changed; if it sleeps, it is called at its next time."""
@@ -78,10 +83,15 @@ class CallTimes:
         # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
         # nothing is lost.
         is_exact = now_s >= self.period_s
-        if self._depends_on is not None and may_sleep and is_exact:
+        if self._depends_on is not None and may_sleep and is_exact and self._is_foreseen():
             self._sleep(self._depends_on, now_s)
         else:
             self._alarm.set(self._next_s)
+
+    def _is_foreseen(self) -> bool:
+        """Whether no value can be published during a call that is not yet in the tables."""
+        depends_on = self._depends_on or ()
+        return self._reads_for_s == 0.0 or not any(each.may_change for each, _ in depends_on)
 
     def _sleep(self, depends_on: Sequence[tuple[Measurements, Thresholds]], now_s: float) -> None:
         self._sleeps, earliest_s = True, self._next_s

@@ -9,7 +9,13 @@ from typing import Any, TypeVar
 
 from suave_des.domain import Task
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
-from suave_des.hooks import dependencies_of, measured_somewhere, names_in, times_of
+from suave_des.hooks import (
+    dependencies_of,
+    measured_somewhere,
+    names_in,
+    reading_time_of,
+    times_of,
+)
 from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
@@ -57,7 +63,7 @@ class ManagerHost:
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
-            reads_for_s = float(self.manager.reads_for_s)
+            reads_for_s = reading_time_of(self.manager)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:

@@ -276,6 +276,24 @@ class Meddling(Metacontrol):
         self.system.change_mode("f_generate_search_path", "fd_spiral_high")
 
 
+class SeesHalf(Metacontrol):
+    """Infers as if the visibility were half of what is measured; counts its plans."""
+
+    depends_on = Metacontrol.depends_on
+    plans = 0
+
+    def analyze(self):
+        measured = dict(self.measurements)
+        self.measurements = {name: value / 2.0 for name, value in measured.items()}
+        inference = super().analyze()
+        self.measurements = measured
+        return inference
+
+    def plan(self, inference):
+        SeesHalf.plans += 1
+        return super().plan(inference)
+
+
 class PlansLow(Metacontrol):
     """Searches at the lowest altitude, whatever the visibility is."""
 

@@ -236,6 +236,10 @@ def failures(*times_s: object) -> dict[str, object]:
         (failures(35.0), []),
         (failures(25.5), []),  # the monitor may notice it at 26 s only
         (failures(10.0), [EARLY]),
+        (
+            failures(35.0) | {"revision.thruster_failures.loss_probability": 1.0},
+            ["thruster_events.0: each failure is lost"],
+        ),
         (failures(10.0, 15.0), [EARLY]),  # in 2023 the second is 15 s later
         (failures({"distribution": "uniform", "minimum": 5, "maximum": 20}), [EARLY]),
         (failures({"distribution": "uniform", "minimum": 5, "maximum": 60}), []),

@@ -340,3 +340,31 @@ def test_built_in_managers(
     values |= {} if other is None else {"signals.performance": other}
     loaded = LOADED[name] if other is None else with_another_signal(name)
     assert_same_missions(Simulator(with_values(loaded, values)), manager, range(run, run + 1))
+
+
+@pytest.mark.parametrize("run", [1, 2, 3])
+def test_a_recharge_while_it_reasons_counts_in_the_same_cycle(run):
+    """The level that is published then is in no table before."""
+    near = {"discharge_time_s": 60.0, "station_x_m": -16.0, "station_y_m": 2.0}
+    values = {"mission.time_limit_s": 80.0, "thruster_events": [], "battery": near}
+    simulator = Simulator(with_values(load_scenario("extended"), values))
+    recorded, not_recorded = (
+        effects(simulator, "metacontrol", run, record=record) for record in (True, False)
+    )
+    assert recorded == not_recorded
+
+
+def test_a_class_with_an_analyze_of_its_own_plans_once_with_what_it_inferred_from():
+    outside_managers.SeesHalf.plans = 0
+    values = {**NO_FAULTS, "signals.water_visibility": {"kind": "constant", "value": 4.0}}
+    result = simulator_of(values).run(f"{OUTSIDE}:SeesHalf", 1, 1, record=True)
+    (mode,) = [each.detail for each in result.events if "= fd_spiral" in each.detail]
+    assert mode == "f_generate_search_path = fd_spiral_low"
+    assert outside_managers.SeesHalf.plans <= 31  # cycles in 60 s: one every 2 s
+
+
+@pytest.mark.parametrize("reads_for_s", [-1.0, float("nan"), "1"])
+def test_a_reading_time_that_is_none_is_told(monkeypatch, reads_for_s):
+    monkeypatch.setattr(outside_managers.ReadsLate, "reads_for_s", reads_for_s)
+    with pytest.raises(MissionError, match=r"reads_for_s is .*; it must be a number of at least 0"):
+        called_s(NO_FAULTS, "ReadsLate")
