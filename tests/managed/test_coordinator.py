@@ -159,12 +159,12 @@ def test_a_detection_that_no_poll_saw_before_the_limit_is_none():
     assert Mission("2023", 300.1).run().coordinator.search_time_s is None
 
 
-@pytest.mark.parametrize(
-    ("name", "mission_wide", "per_task"),
-    [("2023", ("f_maintain_motion",), ()), ("1.5", (), ("f_maintain_motion",))],
-)
-def test_functions_that_the_mission_and_each_task_need(name, mission_wide, per_task):
-    mission = Mission(name, 50.0)
-    assert mission.coordinator.mission_wide_functions == mission_wide
-    functions = [(*per_task, "f_generate_search_path"), (*per_task, "f_follow_pipeline")]
-    assert [task.functions for task in mission.run().tasks] == functions
+@pytest.mark.parametrize(("name", "functions"), [("2023", ("f_maintain_motion",)), ("1.5", ())])
+def test_functions_that_the_mission_needs(name, functions):
+    assert Mission(name, 50.0).coordinator.mission_wide_functions == functions
+
+
+@pytest.mark.parametrize(("name", "too"), [("2023", ()), ("1.5", ("f_maintain_motion",))])
+def test_functions_that_each_task_needs(name, too):
+    functions = [(*too, "f_generate_search_path"), (*too, "f_follow_pipeline")]
+    assert [task.functions for task in Mission(name, 50.0).run().tasks] == functions

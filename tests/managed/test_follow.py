@@ -45,8 +45,11 @@ def along_the_line(t_s: float) -> tuple[float, float, float]:
 def test_path_goes_there_and_back_along_all_points():
     path = there_and_back(np.array(LINE))
     assert path[:, :2].tolist() == [list(point) for point in (*LINE, *reversed(LINE))]
-    assert path[41:46, 2].tolist() == [0.5, 0.5, 0.5, 0.5, 0.0]
-    assert path[0, 2] == 0.0
+
+
+def test_its_way_back_is_higher_but_for_the_last_points():
+    z_m = there_and_back(np.array(LINE))[:, 2]
+    assert z_m[[0, 41, 42, 43, 44, 45]].tolist() == [0.0, 0.5, 0.5, 0.5, 0.5, 0.0]
 
 
 @BOTH

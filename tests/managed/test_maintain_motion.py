@@ -35,11 +35,18 @@ class Motion:
 
 
 @BOTH
-def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s_and_published(name):
+def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s(name):
     motion = Motion(name)
     motion.node.apply(ACTIVE)
     motion.env.run()
     assert motion.restored == [(10.0 + 0.25 * n, n + 1) for n in range(6)]
+
+
+@BOTH
+def test_each_is_published_when_it_is_restored(name):
+    motion = Motion(name)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
     assert motion.published == [
         Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", "RECOVERED")
         for t_s, number in motion.restored

@@ -65,18 +65,25 @@ def test_anything_else_is_refused(managed, function, mode):
     assert managed.modes.change_mode(function, mode) is False
 
 
-def test_effects_come_after_the_latency_and_listeners_are_called_then_but_not_for_what_was_refused(
-    managed,
-):
+def test_a_mode_takes_effect_after_the_latency(managed):
+    managed.modes.change_mode(SEARCH, "fd_spiral_low")
+    managed.env.run()
+    assert managed.search.applied == [(0.5, "fd_spiral_low")]
+
+
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [("fd_spiral_low", [(0.5, SEARCH, "fd_spiral_low")]), ("fd_spiral_very_high", [])],
+    ids=["when it takes effect", "not of a refused one"],
+)
+def test_listeners_are_told_of_a_mode(managed, mode, told):
     effects: list[tuple[float, str, str]] = []
     managed.modes.listeners.append(
         lambda function, mode: effects.append((managed.env.now, function, mode.name))
     )
-    managed.modes.change_mode(SEARCH, "fd_spiral_very_high")
-    managed.modes.change_mode(SEARCH, "fd_spiral_low")
+    managed.modes.change_mode(SEARCH, mode)
     managed.env.run()
-    assert managed.search.applied == [(0.5, "fd_spiral_low")]
-    assert effects == [(0.5, SEARCH, "fd_spiral_low")]
+    assert effects == told
 
 
 def test_the_mode_already_asked_for_succeeds_without_effect(managed):

@@ -68,18 +68,28 @@ def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name, cen
     assert search.spiral(centre) == [point(1, 1)]
 
 
-@BOTH
-def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(
-    name,
-):
+def starting_after_4_5_s(name: str) -> Search:
+    """A search that was activated at 20 s, of which 24.25 s are over."""
     search = Search(name, PlacedVehicle(obeys=True))
     search.node.start_latency_s = 4.5
     search.ticks(20)
     search.node.apply(spiral_at(1.0))
-    search.ticks(5)  # the last one at 24.25 s
-    assert search.vehicle.commands == []
+    search.ticks(5)
+    return search
+
+
+@BOTH
+def test_the_first_set_point_comes_some_time_after_the_first_activation(name):
+    search = starting_after_4_5_s(name)
+    before = len(search.vehicle.commanded)
     search.ticks(1)
-    assert len(search.vehicle.commanded) == 1
+    assert (before, len(search.vehicle.commanded)) == (0, 1)
+
+
+@BOTH
+def test_after_a_later_activation_it_comes_at_once(name):
+    search = starting_after_4_5_s(name)
+    search.ticks(1)
     search.node.apply(INACTIVE)
     search.ticks(10)
     search.node.apply(spiral_at(1.0))
@@ -153,11 +163,19 @@ def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name, step_
     )
 
 
-def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short_and_stays():
+def stopping_short() -> Search:
+    """A vehicle that stops half a metre above each set-point."""
     search = searching("2023", obeys=True, rise_m=0.5)
     search.ticks(20)
-    assert search.vehicle.times_s[:3] == [0.25, 12.25, 13.25]
-    assert {z for _, _, z in search.vehicle.commanded[1:]} == {-19.5}
+    return search
+
+
+def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short():
+    assert stopping_short().vehicle.times_s[:3] == [0.25, 12.25, 13.25]
+
+
+def test_its_offset_stays():
+    assert {z_m for _, _, z_m in stopping_short().vehicle.commanded[1:]} == {-19.5}
 
 
 @pytest.mark.parametrize(("name", "z_m"), [("2023", -19.5), ("1.5", -19.0)])
@@ -171,13 +189,22 @@ def test_offset_after_a_new_activation(name, z_m):
     assert search.last[2] == pytest.approx(z_m)
 
 
-def test_an_altitude_change_in_a_stall_locks_the_spiral_up_and_the_offset_goes_on_falling():
+def locked_up() -> Search:
+    """One whose altitude was changed while it stood."""
     search = searching("2023", 3.0, obeys=True, rise_m=0.5)
     search.ticks(5)
     search.node.apply(spiral_at(1.0))
     search.ticks(50)
-    assert len({place[:2] for place in search.vehicle.commanded}) == 1
-    assert [z for _, _, z in search.vehicle.commanded[1:]] == [-19.5, -20.0, -20.5, -21.0]
+    return search
+
+
+def test_an_altitude_change_in_a_stall_locks_the_spiral_up():
+    assert len({place[:2] for place in locked_up().vehicle.commanded}) == 1
+
+
+def test_the_offset_goes_on_falling_then():
+    z_m = [z_m for _, _, z_m in locked_up().vehicle.commanded[1:]]
+    assert z_m == [-19.5, -20.0, -20.5, -21.0]
 
 
 @BOTH

@@ -113,29 +113,38 @@ def test_in_murky_water_nothing_is_seen(visibility_m):
     assert covered_area_m2(track, 3, np.full(4, visibility_m), -20.0, TANGENT) == 0.0
 
 
-def test_visibility_counts_as_it_was_measured_last_and_before_the_first_measurement_there_is_none():
+def test_visibility_counts_as_it_was_measured_last():
     rows = measured_at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
     assert [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)] == [3.0, 3.0, 2.0, 1.0]
-    assert np.isnan(rows[:4]).all() and np.isnan(measured_at_rows((), (), 10)).all()
-    assert (
-        measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
-    )
 
 
-@given(
-    st.sampled_from(["at_least", "at_most", "close_to"]),
-    st.floats(-9, 9),
-    st.floats(0, 9),
-    st.floats(-99, 99),
+@pytest.mark.parametrize("times_s", [(0.2,), ()], ids=["before the first measurement", "without"])
+def test_there_is_no_visibility_before_it_is_measured(times_s):
+    assert np.isnan(measured_at_rows(times_s, (3.0,) * len(times_s), 10)[:4]).all()
+
+
+def test_what_is_measured_after_the_end_does_not_count():
+    rows = measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40)
+    assert rows.tolist() == [3.0] * 20 + [2.0] * 20
+
+
+REQUIRED = st.builds(
+    Requirement,
+    metric=st.just("search_time_s"),
+    relation=st.sampled_from(["at_least", "at_most", "close_to"]),
+    value=st.floats(-9, 9),
+    tolerance=st.floats(0, 9),
 )
-def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(
-    relation, value, tolerance, measured
-):
-    requirement = Requirement(
-        metric="search_time_s", relation=relation, value=value, tolerance=tolerance
-    )
+
+
+@given(REQUIRED, st.floats(-99, 99))
+def test_satisfaction_is_a_degree(requirement, measured):
     assert 0.0 <= requirement.satisfaction(measured) <= 1.0
-    assert requirement.satisfaction(value) == 1.0
+
+
+@given(REQUIRED)
+def test_satisfaction_is_full_where_the_value_is_as_required(requirement):
+    assert requirement.satisfaction(requirement.value) == 1.0
 
 
 @pytest.mark.parametrize(

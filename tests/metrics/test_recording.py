@@ -28,10 +28,13 @@ def test_points_are_the_poses_of_the_mission(mission):
         assert point.visibility_m is None or point.visibility_m > 0.0
 
 
-def test_visibility_is_none_before_the_first_measurement_and_then_the_last_one(mission):
-    trajectory = mission.result().trajectory
+def test_there_is_no_visibility_before_the_first_measurement(mission):
+    assert mission.result().trajectory[0].visibility_m is None
+
+
+def test_visibility_is_that_of_the_last_measurement(mission):
     measured = mission._surroundings.visibility
-    assert trajectory[0].visibility_m is None
+    trajectory = mission.result().trajectory
     assert all(point.visibility_m == measured.value(point.t_s) for point in trajectory)
 
 

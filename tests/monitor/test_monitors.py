@@ -284,17 +284,28 @@ def publish_events(
 BOTH = pytest.mark.parametrize("after_previous", [True, False], ids=["2023", "1.5"])
 
 
+FAILED_AND_RECOVERED = event(3, "failure", 5.0), event(3, "recovery", 60.0)
+
+
 @BOTH
-def test_failure_and_recovery_happen_when_they_are_published(subscriber, after_previous):
-    failure, recovery = event(3, "failure", 5.0), event(3, "recovery", 60.0)
-    happened = publish_events(subscriber, failure, recovery, after_previous=after_previous)
+def test_events_of_thrusters_happen_when_they_are_published(subscriber, after_previous):
+    happened = publish_events(subscriber, *FAILED_AND_RECOVERED, after_previous=after_previous)
     assert happened == [
-        (subscriber.received[0].time_s, failure[0]),
-        (subscriber.received[1].time_s, recovery[0]),
+        (report.time_s, happening[0])
+        for report, happening in zip(subscriber.received, FAILED_AND_RECOVERED, strict=True)
     ]
-    assert subscriber.received[0] == Diagnostic(
-        5.25, Kind.COMPONENT_STATUS, "c_thruster_3", "FALSE"
-    )
+
+
+@BOTH
+def test_a_failure_is_published_at_the_monitors_next_time(subscriber, after_previous):
+    publish_events(subscriber, *FAILED_AND_RECOVERED, after_previous=after_previous)
+    report = Diagnostic(5.25, Kind.COMPONENT_STATUS, "c_thruster_3", "FALSE")
+    assert subscriber.received[0] == report
+
+
+@BOTH
+def test_a_recovery_is_published_as_such(subscriber, after_previous):
+    publish_events(subscriber, *FAILED_AND_RECOVERED, after_previous=after_previous)
     assert subscriber.received[1].value == "RECOVERED"
 
 
@@ -361,9 +372,13 @@ def test_the_battery_monitor_counts_with_the_rounding_errors_of_the_exemplars():
     assert level.value(150.01) == 0.24999999999999933
 
 
-def test_the_true_level_falls_to_zero_and_anew_from_each_recharge():
+def test_the_true_level_falls_to_zero():
     level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 500.0)
     assert [level.level(t_s) for t_s in (0.0, 50.0, 200.0, 300.0)] == [1.0, 0.75, 0.0, 0.0]
+
+
+def test_it_falls_anew_from_a_recharge():
+    level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 500.0)
     level.recharge(300.0)
     assert level.level(350.0) == 0.75
 

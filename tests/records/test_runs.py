@@ -5,11 +5,12 @@ its line.
 import math
 from pathlib import Path
 
+import pandas
 import pytest
 
 from suave_des.errors import InputError
 from suave_des.records.metrics import METRICS, metric_of
-from suave_des.records.runs import read_runs
+from suave_des.records.runs import Runs, read_runs
 
 OWN = "manager,search_time_s,distance_inspected_m"
 
@@ -25,15 +26,22 @@ def write(tmp_path: Path):
     return write_file
 
 
-def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
-    path = write(
-        "runs.csv", f"scenario,{OWN},detection_x_m\nsea,none,120,3.5,-17.5\nsea,none,300,0,\n"
-    )
-    runs = read_runs(path)
-    assert runs.frame["detection_x_m"].tolist()[0] == -17.5
-    assert math.isnan(runs.frame["detection_x_m"].tolist()[1])
-    assert runs.frame["scenario"].tolist() == ["sea", "sea"]
-    assert runs.frame.index.tolist() == [2, 3]
+@pytest.fixture
+def of_a_campaign(write) -> pandas.DataFrame:
+    rows = "sea,none,120,3.5,-17.5\nsea,none,300,0,\n"
+    return read_runs(write("runs.csv", f"scenario,{OWN},detection_x_m\n{rows}")).frame
+
+
+def test_a_campaigns_places_of_detection_are_read(of_a_campaign):
+    assert of_a_campaign["detection_x_m"].fillna("none").tolist() == [-17.5, "none"]
+
+
+def test_a_campaigns_scenario_is_read(of_a_campaign):
+    assert of_a_campaign["scenario"].tolist() == ["sea", "sea"]
+
+
+def test_missions_have_the_numbers_of_their_lines(of_a_campaign):
+    assert of_a_campaign.index.tolist() == [2, 3]
 
 
 def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
@@ -73,6 +81,7 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
             "search_time_s: expected a finite number, at most 1e+12, got '2e12'",
         ),
         (f"{OWN}\nnone,-1,3\n", 2, "search_time_s: expected a finite number, at least 0, got '-1'"),
+        (f"{OWN},adaptations\nnone,1,3,1e400\n", 2, "adaptations: expected a whole number"),
         (f"{OWN}\nnone,120\n", 2, "has 2 values, but the header has 3"),
         (f"{OWN}\n ,120,3\n", 2, "manager: expected a manager's name"),
         (f'{OWN}\n"none,120,3\n', 2, "is not valid CSV"),
@@ -120,7 +129,7 @@ OF_2023 = 'time constrained {},Feb-04-2023-00-56-36,"(-17.0, 2.57)",300,{},{}'
 OF_1_5 = 'suave {},01-Jul-2025-00-43-53,"(-17.0, 2.57)",250,{},{},{},{}'
 
 
-@pytest.mark.parametrize(
+AVERAGES = pytest.mark.parametrize(
     ("rows", "averages"),
     [
         (["Mean,,,,,87.0,40.25,0.5", "Std,,,,,0.0,0.0,0.0"], (3, 4)),
@@ -128,17 +137,24 @@ OF_1_5 = 'suave {},01-Jul-2025-00-43-53,"(-17.0, 2.57)",250,{},{},{},{}'
         ([",,,AVERAGE,,87", "std:,1"], (3, 4)),
     ],
 )
-def test_rows_of_averages_and_blank_rows_of_the_exemplars_files_are_left_out(write, rows, averages):
-    runs = read_runs(
-        write(
-            "results.csv", "\n".join([HEADER_1_5, OF_1_5.format("bt", True, 87, 40.25, 0.5), *rows])
-        )
-    )
-    assert len(runs.frame) == 1
+
+
+@pytest.fixture
+def with_averages(write, rows) -> Runs:
+    lines = [HEADER_1_5, OF_1_5.format("bt", True, 87, 40.25, 0.5), *rows]
+    return read_runs(write("results.csv", "\n".join(lines)))
+
+
+@AVERAGES
+def test_averages_of_the_exemplars_files_are_no_missions(with_averages, averages):
+    assert len(with_averages.frame) == 1
+
+
+@AVERAGES
+def test_their_lines_are_noted(with_averages, averages):
     lines = ", ".join(map(str, averages))
-    assert runs.notes == (
-        f"{next(iter(runs.files))}: lines {lines} left out: averages, not missions",
-    )
+    (file,) = with_averages.files
+    assert with_averages.notes == (f"{file}: lines {lines} left out: averages, not missions",)
 
 
 def test_files_of_the_exemplar_that_were_put_together_are_read(write):
@@ -216,15 +232,26 @@ def test_a_reaction_time_of_zero_is_none_unless_a_campaign_wrote_it(write, scena
     assert times.notna().tolist() == is_known
 
 
-@pytest.mark.parametrize("number", ["1" * 400, "1e400", "-" + "9" * 30])
-def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_a_metric(
-    write, number
-):
-    frame = read_runs(write("runs.csv", f"{OWN},{number},depth\nnone,120,3,1,{number}\n")).frame
+IN_NO_SWEEP = pytest.mark.parametrize("number", ["1" * 400, "1e400", "-" + "9" * 30])
+
+
+@IN_NO_SWEEP
+def test_a_number_that_no_sweep_has_may_name_a_column(write, number):
+    frame = read_runs(write("runs.csv", f"{OWN},{number}\nnone,120,3,1\n")).frame
     assert frame[number].tolist() == [1]
+
+
+@IN_NO_SWEEP
+def test_in_a_further_column_it_is_text_or_a_number(write, number):
+    frame = read_runs(write("runs.csv", f"{OWN},depth\nnone,120,3,{number}\n")).frame
     assert frame["depth"].tolist() in ([number], [float(number)])
-    with pytest.raises(InputError, match="line 2: adaptations: expected a whole number"):
+
+
+@IN_NO_SWEEP
+def test_as_a_metric_it_is_refused_with_its_line(write, number):
+    with pytest.raises(InputError) as caught:
         read_runs(write("runs.csv", f"{OWN},adaptations\nnone,120,3,{number}\n"))
+    assert caught.value.place == "line 2"
 
 
 def test_a_metric_of_which_one_direction_is_better_has_the_words_to_say_so():

@@ -300,9 +300,16 @@ def test_a_name_that_cannot_be_a_file_is_refused(write, name):
         load_scenario(name)
 
 
-def test_what_the_command_line_names_and_is_not_there_is_named(write):
-    assert refused(write, HEAD, ontologies=["nowhere.owl"]).file == "nowhere.owl"
-    assert refused(write, HEAD, modes_file="nowhere.yaml").file == "nowhere.yaml"
+@pytest.mark.parametrize(
+    ("given", "file"),
+    [({"ontologies": ["nowhere.owl"]}, "nowhere.owl"), ({"modes_file": "no.yaml"}, "no.yaml")],
+    ids=["ontology", "modes"],
+)
+def test_a_file_of_the_command_line_that_is_not_there_is_named(write, given, file):
+    assert refused(write, HEAD, **given).file == file
+
+
+def test_a_reasoner_of_the_command_line_is_told_with_its_option(write):
     assert str(refused(write, HEAD, reasoner="pelet")) == (
         "--reasoner: there is no reasoner 'pelet' (did you mean 'pellet'? known: cached, pellet, owlready2)"
     )

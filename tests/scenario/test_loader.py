@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.scenario.models import Calibration, Normal, TableSignal, ThrusterEvent
-from tests.helpers.command import command_here
+from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
+from suave_des.scenario.models import Calibration, Normal, Scenario, TableSignal, ThrusterEvent
 
 HEAD = "base: seams2023.yaml\n"
 SHIPPED = ("seams2023", "planta_exp1", "release15", "extended", "paper_table_values")
@@ -115,7 +114,9 @@ def test_a_derived_scenario_is_called_after_its_file_unless_it_says_otherwise(wr
     assert load_scenario(write("slow_sea.yaml", HEAD + "name: other\n")).scenario.name == "other"
 
 
-def test_null_removes_a_signal_a_value_and_the_battery(write):
+@pytest.fixture
+def with_nulls(write) -> Scenario:
+    """A scenario over one with four values, two signals and a battery."""
     write(
         "base.yaml",
         "base: paper_table_values\nbattery: {}\nsignals: {chlorophyll: {kind: constant, value: 1}}\n",
@@ -125,11 +126,20 @@ def test_null_removes_a_signal_a_value_and_the_battery(write):
         "base: base.yaml\nbattery: null\nsignals: {chlorophyll: null}\n"
         "knowledge: {values: {qa_performance_recover_thrusters: null}}\n",
     )
-    scenario = load_scenario(path).scenario
-    assert scenario.battery is None
-    assert set(scenario.signals) == {"water_visibility"}
-    assert "qa_performance_recover_thrusters" not in scenario.knowledge.values
-    assert len(scenario.knowledge.values) == 3
+    return load_scenario(path).scenario
+
+
+def test_null_removes_the_battery(with_nulls):
+    assert with_nulls.battery is None
+
+
+def test_null_removes_a_signal(with_nulls):
+    assert set(with_nulls.signals) == {"water_visibility"}
+
+
+def test_null_removes_a_value(with_nulls):
+    assert len(with_nulls.knowledge.values) == 3
+    assert "qa_performance_recover_thrusters" not in with_nulls.knowledge.values
 
 
 def test_both_spellings_of_thruster_events_mean_the_same(write):
@@ -188,18 +198,32 @@ def test_a_path_wins_over_the_shipped_file_of_that_name(write):
     assert load_scenario("seams2023.yaml").scenario.revision.name == "1.5"
 
 
-def test_the_command_line_replaces_ontologies_modes_and_reasoner(write, shipped_modes):
+@pytest.fixture
+def replaced(write, shipped_modes) -> LoadedScenario:
     write("own.owl", "<rdf/>")
     write("second.owl", "<rdf/>")
     write("m.yaml", shipped_modes)
-    loaded = load_scenario(
-        "seams2023", ontologies=["own.owl", "second.owl"], modes_file="m.yaml", reasoner="owlready2"
+    ontologies = ["own.owl", "second.owl"]
+    return load_scenario(
+        "seams2023", ontologies=ontologies, modes_file="m.yaml", reasoner="owlready2"
     )
-    assert loaded.ontologies == (Path("own.owl"), Path("second.owl"))
-    assert loaded.modes_path == Path("m.yaml")
-    assert loaded.scenario.knowledge.ontologies == ("own.owl", "second.owl")
-    assert loaded.scenario.knowledge.reasoner == "owlready2"
-    assert loaded.scenario.modes_file == "m.yaml"
+
+
+def test_the_command_line_replaces_ontologies(replaced):
+    assert replaced.ontologies == (Path("own.owl"), Path("second.owl"))
+
+
+def test_the_command_line_replaces_the_modes(replaced):
+    assert replaced.modes_path == Path("m.yaml")
+
+
+def test_the_scenario_says_what_the_command_line_has_replaced(replaced):
+    knowledge = replaced.scenario.knowledge
+    assert (knowledge.ontologies, knowledge.reasoner, replaced.scenario.modes_file) == (
+        ("own.owl", "second.owl"),
+        "owlready2",
+        "m.yaml",
+    )
 
 
 def test_every_file_read_is_hashed_under_the_name_shown(write):
@@ -284,12 +308,6 @@ def test_a_campaign_tells_for_how_many_swept_values(caplog):
     )
     (message,) = [each for each in caplog.messages if "no effect" in each]
     assert message.startswith(f"note: {EARLY}") and message.endswith(", at 2 of 3 swept values")
-
-
-def test_kb_check_warns(tmp_path):
-    done = command_here("kb", "check", "--set", "thruster_events=['(1,failure,10)']", cwd=tmp_path)
-    assert done.returncode == 0
-    assert f"WARN   shipped/scenarios/seams2023.yaml: {EARLY}" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -36,25 +36,33 @@ def changed(old: str, new: str) -> str:
     return SEARCH.replace(old, new)
 
 
-def test_the_shipped_file_has_the_altitudes_and_active_modes_of_the_exemplar():
-    table = read_modes(find("suave_modes.yaml", "scenarios"))
-    search = {
-        mode: table.mode("f_generate_search_path", mode)
-        for mode in table.modes("f_generate_search_path")
+SPIRALS = ("fd_spiral_low", "fd_spiral_medium", "fd_spiral_high")
+
+
+def test_the_shipped_file_has_the_altitudes_of_the_exemplar():
+    table, function = read_modes(find("suave_modes.yaml", "scenarios")), "f_generate_search_path"
+    altitudes_m = {
+        mode: table.mode(function, mode).parameters.get("spiral_altitude")
+        for mode in table.modes(function)
     }
-    altitudes = {mode: found.parameters.get("spiral_altitude") for mode, found in search.items()}
-    names = ("__DEFAULT__", "fd_unground", "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high")
-    assert altitudes == dict(zip(names, (1.0, None, 1.0, 2.0, 3.0), strict=True))
+    names = ("__DEFAULT__", "fd_unground", *SPIRALS)
+    assert altitudes_m == dict(zip(names, (1.0, None, 1.0, 2.0, 3.0), strict=True))
+
+
+def test_the_shipped_file_has_the_active_modes_of_the_exemplar():
+    table = read_modes(find("suave_modes.yaml", "scenarios"))
     active = {
         f"{name} {mode}"
         for name in table.functions
         for mode in table.modes(name)
         if table.mode(name, mode).active
     }
-    others = {"f_follow_pipeline fd_follow_pipeline", "f_maintain_motion fd_recover_thrusters"}
-    others |= {"f_maintain_motion __DEFAULT__", "generate_recharge_path normal"}
-    assert active == others | {
-        f"f_generate_search_path {name}" for name in names if name != "fd_unground"
+    assert active == {
+        *(f"f_generate_search_path {mode}" for mode in ("__DEFAULT__", *SPIRALS)),
+        "f_follow_pipeline fd_follow_pipeline",
+        "f_maintain_motion fd_recover_thrusters",
+        "f_maintain_motion __DEFAULT__",
+        "generate_recharge_path normal",
     }
 
 

@@ -1,5 +1,6 @@
 """YAML files, and tables of signals: what is read, and each way in which a file is refused."""
 
+import hashlib
 import json
 import string
 from pathlib import Path
@@ -53,12 +54,14 @@ def test_scalars_follow_the_core_schema(write):
     ]
 
 
-def test_each_key_and_item_has_its_line(write):
-    document = read_yaml(write("a.yaml", "# comment\na:\n  b: 1\n  c:\n    - x\n    - {d: 2}\n"))
-    assert document.place(("a",)).line == 2
-    assert document.place(("a", "b")).line == 3
-    assert document.place(("a", "c", 1)).line == 6
-    assert document.place(("a", "c", 1, "d")).line == 6
+@pytest.mark.parametrize(
+    ("keys", "line"),
+    [(("a",), 2), (("a", "b"), 3), (("a", "c", 1), 6), (("a", "c", 1, "d"), 6)],
+    ids=["a key", "a key within it", "an item", "a key of it"],
+)
+def test_what_is_in_a_file_has_its_line(write, keys, line):
+    content = "# comment\na:\n  b: 1\n  c:\n    - x\n    - {d: 2}\n"
+    assert read_yaml(write("a.yaml", content)).place(keys).line == line
 
 
 def test_a_path_that_is_not_there_has_the_line_of_what_would_hold_it(write):
@@ -102,10 +105,14 @@ def test_what_is_no_plain_mapping_is_refused_with_its_line(write, content, place
         "!own text",
     ],
 )
-def test_a_tag_that_would_build_an_object_is_refused_and_builds_nothing(write, value):
+def test_a_tag_that_would_build_an_object_is_refused(write, value):
     assert refused(write("a.yaml", f"x: 1\na: {value}\n")).startswith(
         "a.yaml: line 2, a: the tag '!"
     )
+
+
+def test_it_builds_nothing(write):
+    refused(write("a.yaml", "a: !!python/object/apply:os.system ['touch made']\n"))
     assert not Path("made").exists()
 
 
@@ -168,13 +175,17 @@ def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
         assert all(isinstance(key, str) for key in document.data)
 
 
-def test_a_table_gives_times_and_values(write):
-    (times_s, values), digest = read_table(
-        write("t.csv", "t_s,value\n0,3.5\n 60 , 1e0\n\n120,-2\n")
-    )
-    assert times_s == (0.0, 60.0, 120.0)
-    assert values == (3.5, 1.0, -2.0)
-    assert len(digest) == 64
+TABLE = "t_s,value\n0,3.5\n 60 , 1e0\n\n120,-2\n"
+
+
+def test_a_table_gives_times_with_their_values(write):
+    columns, _ = read_table(write("t.csv", TABLE))
+    assert columns == ((0.0, 60.0, 120.0), (3.5, 1.0, -2.0))
+
+
+def test_a_table_gives_the_hash_of_its_file(write):
+    _, digest = read_table(write("t.csv", TABLE))
+    assert digest == hashlib.sha256(TABLE.encode()).hexdigest()
 
 
 def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):

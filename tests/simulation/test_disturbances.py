@@ -3,6 +3,7 @@ vary.
 """
 
 import math
+from functools import cache
 from itertools import pairwise
 
 import pytest
@@ -31,18 +32,43 @@ def details(result: MissionResult, event: str) -> list[str]:
     return [each.detail for each in result.events if each.event == event]
 
 
-@pytest.mark.parametrize(
+EVERY_MANAGER = pytest.mark.parametrize(
     "manager",
     ["none", "fixed:fd_spiral_high", "threshold", "oracle", "metacontrol", "bt", "bt_extended"],
 )
-def test_a_leak_makes_every_manager_surface_and_ends_the_mission_there(fly, manager):
-    result = fly(LEAK, manager)
-    assert "hull LEAK" in details(result, "component_status")
+
+
+@pytest.fixture(scope="module")
+def leaking():
+    """Flies a mission with a leak once for each manager."""
+    loaded = load_scenario("extended")
+    values = {"leak": {"time_s": 170.0}, "metrics": ["surfacing_time_s"]}
+    simulator = Simulator(with_values(loaded, values))
+    return cache(lambda manager: simulator.run(manager, run=3, seed=1, record=True))
+
+
+@EVERY_MANAGER
+def test_a_leak_is_published(leaking, manager):
+    assert "hull LEAK" in details(leaking(manager), "component_status")
+
+
+@EVERY_MANAGER
+def test_a_leak_makes_every_manager_surface(leaking, manager):
+    result = leaking(manager)
     assert details(result, "task_requested")[-1] == "surface"
-    assert details(result, "mission_ended") == ["the vehicle has surfaced"]
     assert result.trajectory[-1].z_m == pytest.approx(0.0, abs=0.11)
-    assert 170.0 + result.further["surfacing_time_s"] == pytest.approx(
-        result.metrics.mission_duration_s, abs=0.2
+
+
+@EVERY_MANAGER
+def test_the_mission_ends_when_the_vehicle_has_surfaced(leaking, manager):
+    assert details(leaking(manager), "mission_ended") == ["the vehicle has surfaced"]
+
+
+@EVERY_MANAGER
+def test_surfacing_takes_the_time_from_the_leak_to_the_end(leaking, manager):
+    result = leaking(manager)
+    assert result.further["surfacing_time_s"] == pytest.approx(
+        result.metrics.mission_duration_s - 170.0, abs=0.2
     )
 
 
@@ -64,19 +90,30 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     assert x_m[150] - x_m[100] == pytest.approx(half, rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("manager", "mode"), [("metacontrol", "fd_recover_thrusters"), ("bt", "fd_recover_thrusters")]
-)
-def test_a_thruster_that_cannot_be_recovered_stays_lost_and_is_not_reported(fly, manager, mode):
-    event = "{thruster: 1, event: failure, time_s: 35, recoverable: false}"
-    result = fly(
-        f"base: release15.yaml\nthruster_events: [{event}]\nmetrics: [operational_thrusters]\n",
-        manager,
-    )
-    reports = details(result, "component_status")
-    assert f"f_maintain_motion = {mode}" in details(result, "mode_set")
-    assert "c_thruster_2 RECOVERED" in reports
-    assert "c_thruster_1 RECOVERED" not in reports
+RECOVERING = pytest.mark.parametrize("manager", ["metacontrol", "bt"])
+
+
+@pytest.fixture(scope="module")
+def with_one_lost():
+    """Flies a mission whose thruster 1 is lost for good from 35.5 s on, once for each manager."""
+    lost = {"thruster": 1, "event": "failure", "time_s": 35.0, "recoverable": False}
+    values = {"thruster_events": [lost], "metrics": ["operational_thrusters"]}
+    simulator = Simulator(with_values(load_scenario("release15"), values))
+    return cache(lambda manager: simulator.run(manager, run=3, seed=1, record=True))
+
+
+@RECOVERING
+def test_all_thrusters_but_one_that_is_lost_for_good_are_reported_as_recovered(
+    with_one_lost, manager
+):
+    reports = details(with_one_lost(manager), "component_status")
+    recovered = {report for report in reports if report.endswith("RECOVERED")}
+    assert recovered == {f"c_thruster_{number} RECOVERED" for number in range(2, 7)}
+
+
+@RECOVERING
+def test_a_thruster_that_cannot_be_recovered_stays_lost(with_one_lost, manager):
+    result = with_one_lost(manager)
     duration_s = result.metrics.mission_duration_s
     assert result.further["operational_thrusters"] == pytest.approx(
         6 - (duration_s - 35.5) / duration_s, abs=0.01

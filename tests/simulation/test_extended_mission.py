@@ -68,9 +68,15 @@ def test_the_search_goes_on_around_the_same_centre():
     assert distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0
 
 
-def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept():
-    result = flown("metacontrol", mission__time_limit_s=900.0, battery__discharge_time_s=240.0)
-    assert result.metrics.distance_inspected_m > 20.0
+TWO_LEGS = {"mission__time_limit_s": 900.0, "battery__discharge_time_s": 240.0}
+
+
+def test_the_distance_inspected_before_the_recharge_is_kept():
+    assert flown("metacontrol", **TWO_LEGS).metrics.distance_inspected_m > 20.0
+
+
+def test_following_goes_on_at_the_point_where_it_was_left():
+    result = flown("metacontrol", **TWO_LEGS)
     followed = [p for p in result.trajectory if p.mode == "fd_follow_pipeline"]
     first_leg = [
         p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]
@@ -83,19 +89,23 @@ def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_ke
 def test_the_trees_way_to_the_station_ends_with_the_recharge():
     """Its sequence goes on to its last step: a plain fallback does not ask the guard again."""
     result = flown("bt_extended")
-    assert [
-        each.detail
-        for each in result.events
-        if each.event == "mode_set" and "recharge" in each.detail
-    ] == ["generate_recharge_path = normal", "generate_recharge_path = inactive"]
+    modes = [each.detail for each in result.events if each.event == "mode_set"]
+    recharging = [detail for detail in modes if "recharge" in detail]
+    assert recharging == ["generate_recharge_path = normal", "generate_recharge_path = inactive"]
+
+
+def test_the_tree_follows_the_pipeline_again_when_the_battery_is_charged():
+    result = flown("bt_extended")
     (recharged_s,) = times_s(result, "battery_crossing", "rises to")
-    assert (
-        recharged_s
-        < times_s(result, "mode_set", "f_follow_pipeline = fd_follow_pipeline")[1]
-        < recharged_s + 1.0
-    )
+    again_s = times_s(result, "mode_set", "f_follow_pipeline = fd_follow_pipeline")[1]
+    assert recharged_s < again_s < recharged_s + 1.0
+
+
+def test_after_the_recharge_the_tree_draws_the_vehicle_back_no_more():
+    result = flown("bt_extended")
+    (recharged_s,) = times_s(result, "battery_crossing", "rises to")
     x_m = [each.x_m for each in result.trajectory if each.t_s > recharged_s + 20.0]
-    assert x_m[-1] < x_m[0] - 5.0  # it is not drawn back
+    assert x_m[-1] < x_m[0] - 5.0
 
 
 def test_the_level_is_the_knowledge_bases_and_not_the_codes():

@@ -93,12 +93,18 @@ def test_another_noise_source_changes_nothing_else(simulator, manager, run):
 # Metrics
 
 
+IN_TURBID_WATER = {"signals": {"water_visibility": {"minimum": 0.1, "maximum": 0.2}}}
+
+
 @SCENARIOS
-def test_a_pipeline_not_found_is_searched_until_the_limit_and_not_inspected(simulator, scenario):
-    result = simulator(
-        scenario, signals={"water_visibility": {"minimum": 0.1, "maximum": 0.2}}
-    ).run("none", 1, 1)
-    assert not result.metrics.pipeline_found and result.metrics.search_time_s == 300.0
+def test_a_pipeline_not_found_is_searched_until_the_limit(simulator, scenario):
+    metrics = simulator(scenario, **IN_TURBID_WATER).run("none", 1, 1).metrics
+    assert (metrics.pipeline_found, metrics.search_time_s) == (False, 300.0)
+
+
+@SCENARIOS
+def test_a_pipeline_not_found_is_not_inspected(simulator, scenario):
+    result = simulator(scenario, **IN_TURBID_WATER).run("none", 1, 1)
     assert result.metrics.distance_inspected_m == 0.0
 
 
