@@ -207,16 +207,18 @@ def resume_campaign(
             error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    changed: dict[str, Any] = {
-        "runs": runs,
-        "scheduler": scheduler,
-        "managers": managers,
-        "confirmed": confirmed,
-    }
     return _frame_of(
         folder,
         progress,
-        lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed),
+        lambda show: campaigns.resume_campaign(
+            folder,
+            workers,
+            runs=runs,
+            scheduler=scheduler,
+            managers=managers,
+            confirmed=confirmed,
+            on_progress=show,
+        ),
     )
 
 

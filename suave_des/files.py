@@ -33,6 +33,8 @@ _DEEPEST = 200
 _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _PART = ".part"
 
+Json = dict[str, Any]
+"""An object of JSON or YAML as it was read: what its values are is checked where they are used."""
 PAGES = ("replay.html", "report.html")
 """Files that are made beside the results of any family."""
 VALIDATION_FILES = (

@@ -126,8 +126,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._needed: frozenset[str] = frozenset()
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Observation, dict[str, object]]:
         """Begin a mission."""
         super().reset(seed=seed)
         self.close()
@@ -142,7 +142,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def step(
         self, action: Sequence[int] | NDArray[np.int64]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    ) -> tuple[Observation, float, bool, bool, dict[str, object]]:
         """Request the modes of an action, and advance by a period."""
         mission = self._mission
         if mission is None:
@@ -244,7 +244,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         values += self._mode_indices
         return np.array(values, np.float32)
 
-    def _info(self, mission: Mission) -> dict[str, Any]:
+    def _info(self, mission: Mission) -> dict[str, object]:
         """Return mission time and task; at the end the metrics."""
         now = {
             "time_s": min(self._time_s, mission.now_s),

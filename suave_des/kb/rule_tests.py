@@ -380,7 +380,7 @@ def tests_text(
     Raises:
         KnowledgeError: the reasoner takes too long.
     """
-    content: dict[str, Any] = {
+    content: dict[str, object] = {
         key: value if isinstance(value, str) else list(map(str, value))
         for key, value in about.items()
         if value
@@ -407,7 +407,7 @@ def _given(state: KnowledgeState) -> dict[str, Any]:
     return given
 
 
-def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
+def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, object]:
     if outcome.reasoning is None:
         return {"contradiction": True}
     follows = {"follows": sorted(map(str, outcome.inferred))} if outcome.inferred else {}

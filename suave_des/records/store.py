@@ -303,7 +303,9 @@ class Store:
             InputError: the store is damaged.
         """
 
-        def checked(records: Iterable[Any]) -> Iterator[MissionOutcome]:
+        def checked(
+            records: Iterable[tuple[int, int, int, int, str, int]],
+        ) -> Iterator[MissionOutcome]:
             for record in records:
                 outcome = _outcome(record, self.path)
                 if problem := problem_of(outcome):

@@ -97,7 +97,7 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     is_any_lost = any((group.frame[FOUND_BY_HORIZON] < 1.0).any() for group in groups)
     if is_any_lost and math.isfinite(drawn.time_limit_s):
         times.axvline(drawn.time_limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-        note: dict[str, Any] = {
+        note: style.Look = {
             "color": "#555555",
             "fontsize": 7,
             "rotation": 90,
@@ -189,7 +189,7 @@ def _draw_row_of_differences(
     axes.plot(rain, row + 0.08 + beside, "o", color=colour, ms=2.4, alpha=0.6, mew=0)
     found = mean_of(values.tolist())
     errors = [[found.value - found.low], [found.high - found.value]] if found.has_interval else None
-    look: dict[str, Any] = {
+    look: style.Look = {
         "fmt": "D",
         "ms": 3,
         "mfc": "white",
@@ -202,7 +202,7 @@ def _draw_row_of_differences(
     extremes = least_and_greatest(np.array(apart, dtype=np.float64), runs)
     ends = zip(extremes, (("right", -4), ("left", 4)), strict=True)
     for (value, run), (side, shift) in ends if has_numbers else ():
-        place: dict[str, Any] = {
+        place: style.Look = {
             "textcoords": "offset points",
             "ha": side,
             "va": "center",
@@ -413,7 +413,7 @@ def _draw_grid(
     image = axes.imshow(values, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
     for (row, column), mean in np.ndenumerate(grid):
         ink = "white" if mean.value < (low + high) / 2.0 else style.BLACK
-        look: dict[str, Any] = {"color": ink, "ha": "center"}
+        look: style.Look = {"color": ink, "ha": "center"}
         number = text(mean.value) if np.isfinite(mean.value) else ""
         if mean.has_interval:
             half = f"±{text((mean.high - mean.low) / 2.0)}"

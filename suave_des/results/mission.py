@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import cycle, groupby, pairwise
 from string import ascii_uppercase
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pandas
@@ -219,8 +219,8 @@ def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
 
 _IDLE_MODES = ("", UNGROUND_MODE, "inactive")
 _ZOOM_MARGIN_M = 0.6
-_PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
-_VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
+_PIPELINE: style.Look = {"color": "#CFCFCF", "lw": 4.0}
+_VISIBILITY: style.Look = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _BATTERY_COLOUR = style.GREEN
 _LETTER_OFFSETS = (
     (4, 4),
@@ -237,7 +237,7 @@ _LETTER_OFFSETS = (
 """Where a letter may stand beside its point, in points; the first that is free is taken."""
 _LETTER_POINTS = 9.0
 _LETTER_ROW_SHARE = 0.075
-_LETTER: dict[str, Any] = {"weight": "bold", "fontsize": 8}
+_LETTER: style.Look = {"weight": "bold", "fontsize": 8}
 
 
 class _Mark(NamedTuple):
@@ -341,7 +341,7 @@ def _marks(record: MissionRecord) -> Iterator[_Mark]:
         yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
 
 
-def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
+def _way_look(colours: dict[str, str], mode: str) -> style.Look:
     """Return the style of a stretch of the path: line widths distinguish the search altitudes
     without colours.
     """
@@ -462,7 +462,7 @@ def _draw_over_time(
     for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-        look: dict[str, Any] = {
+        look: style.Look = {
             "color": mark.colour,
             "ha": "center",
             "va": "top",
@@ -575,7 +575,7 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     if record.metrics["pipeline_found"]:
         axes.axvline(found_s, color=style.BLACK, lw=0.9)
         is_late = found_s > 0.8 * record.end_s
-        look: dict[str, Any] = {
+        look: style.Look = {
             "textcoords": "offset points",
             "ha": "right" if is_late else "left",
             "fontsize": 7,
@@ -588,7 +588,7 @@ def _draw_altitude(axes: Axes, record: MissionRecord, listed: Sequence[Adaptatio
     )
     rows = _letter_rows([each.t_s for each in listed], 0.022 * record.end_s)
     for letter, each, row in zip(ascii_uppercase, listed, rows, strict=False):
-        place: dict[str, Any] = {
+        place: style.Look = {
             "xycoords": ("data", "axes fraction"),
             "textcoords": "offset points",
         }
@@ -655,12 +655,12 @@ def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
     for row, (name, bars) in enumerate(lines):
         for span, colour, _ in bars:
             length_s = span.end_s - span.begin_s
-            edge: dict[str, Any] = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
+            edge: style.Look = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
             axes.barh(row, length_s, _BAR, span.begin_s, color=colour, **edge)
         texts = list(_bar_texts(bars, end_s))
         if {label for label, *_ in texts} == {style.text(words) for *_, words in bars}:
             for label, begin_s, ink in texts:
-                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
+                look: style.Look = {"va": "center", "fontsize": _BAR_POINTS, "zorder": 3}
                 axes.text(begin_s, row, label, color=ink, clip_on=True, **look)
         else:
             legend |= {style.text(f"{name}: {words}"): colour for _, colour, words in bars}
@@ -709,7 +709,7 @@ def _draw_list(axes: Axes, sentences: Sequence[str], columns: int) -> None:
     for place, text in enumerate(sentences):
         column, row = divmod(place, rows)
         letter = "" if place >= _LISTED else f"{ascii_uppercase[place]}  "
-        look: dict[str, Any] = {"va": "top", "fontsize": 6.5, "transform": axes.transAxes}
+        look: style.Look = {"va": "top", "fontsize": 6.5, "transform": axes.transAxes}
         axes.text(column / columns, 1.0 - row / rows, style.text(letter + text), **look)
 
 

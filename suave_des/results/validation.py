@@ -39,7 +39,6 @@ from suave_des.records.missions import in_papers_order
 from suave_des.records.runs import read_runs
 from suave_des.resources import find
 from suave_des.results import statistics
-from suave_des.results.comparison import Row
 from suave_des.results.real import (
     CONDITION,
     PAPERS_RUNS,
@@ -50,7 +49,7 @@ from suave_des.results.real import (
     count,
 )
 from suave_des.results.statistics import SIGNIFICANCE, Sample
-from suave_des.tables import Table, markdown_text, rows_of
+from suave_des.tables import Table, TableRow, markdown_text, rows_of
 
 COMPARED = (*PAPER_METRICS, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
@@ -304,7 +303,7 @@ def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
     return runs.loc[runs["manager"] == manager, metric].dropna().to_numpy(dtype=float)
 
 
-def _described(name: str, sample: Sample) -> dict[str, Any]:
+def _described(name: str, sample: Sample) -> TableRow:
     """Describe a sample by columns that begin with a name: n, mean and std with their intervals,
     and median.
     """
@@ -319,7 +318,7 @@ def _described(name: str, sample: Sample) -> dict[str, Any]:
 
 def _cell(
     metric: str, manager: str, samples: Sequence[Sample], generators: _Generators
-) -> dict[str, Any]:
+) -> TableRow:
     """Compare the real and the simulated sample of a manager."""
     real, ours = samples
     from scipy.stats import ks_2samp  # with ties its p is too high
@@ -344,7 +343,7 @@ def _pair(
     other: tuple[str, str],
     samples: Sequence[Sequence[Sample]],
     generators: _Generators,
-) -> dict[str, Any]:
+) -> TableRow:
     """Compare two managers in a metric (metric, manager), each with its real and its simulated
     sample.
     """
@@ -358,7 +357,7 @@ def _pair(
     sign = statistics.sign_of(published["p_less"], published["p_greater"])
     sizes = len(real), len(other_real)
     rng = generators(f"subsamples/{first}/{second}/{metric}")
-    row: dict[str, Any] = {"first": first, "second": second, "metric": metric}
+    row: TableRow = {"first": first, "second": second, "metric": metric}
     # The exemplar's own one-sided tests: less time, or a greater distance, is better.
     if METRICS[metric].better < 0:
         row["published_superiority"] = 1.0 - published["effect"]
@@ -404,12 +403,10 @@ def compare_shares(
     return pandas.DataFrame(rows)
 
 
-def _share_row(
-    share: Share, published: tuple[int, int], simulated: tuple[int, int]
-) -> dict[str, Any]:
+def _share_row(share: Share, published: tuple[int, int], simulated: tuple[int, int]) -> TableRow:
     """Return the cells of a share, of which each side has so many missions of so many."""
     low, high = share.target or (math.nan, math.nan)
-    row: dict[str, Any] = {"manager": share.manager, "name": share.name}
+    row: TableRow = {"manager": share.manager, "name": share.name}
     for side, (number, n) in (("published", published), ("simulated", simulated)):
         columns = share_of(number, n, "exact").columns(f"{side}_share")
         row |= {f"{side}_count": number, f"{side}_n": n, **columns}
@@ -680,7 +677,7 @@ def _conditions_table(conditions: pandas.DataFrame, real: str) -> Table:
     )
 
 
-def _target(each: Row) -> tuple[str, ...]:
+def _target(each: TableRow) -> tuple[str, ...]:
     kind = each["kind"]
     if kind == "share":
         what = each["what"]
