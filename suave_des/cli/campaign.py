@@ -25,7 +25,7 @@ from suave_des.cli.options import (
     ManagerOptions,
     Overwrite,
     Quiet,
-    Scenario,
+    ScenarioArgument,
     Seed,
     Trusted,
     any_scenario,
@@ -290,7 +290,7 @@ def reproduce(
 
 
 def run(
-    scenario: Scenario,
+    scenario: ScenarioArgument,
     *,
     options: Annotated[
         Given,
@@ -408,7 +408,7 @@ class _Served:
 
 
 def serve(
-    scenario: Scenario,
+    scenario: ScenarioArgument,
     *,
     options: Annotated[
         Given,

@@ -30,7 +30,7 @@ from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
 NOT_MEASURED: Final = -1.0
-SEED_LIMIT: Final = 2**31
+DRAWN_SEED_LIMIT: Final = 2**31
 _SPREADS: Final = 6.0
 """So many standard deviations are taken for the bounds of a normal distribution that has none."""
 REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
@@ -131,7 +131,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         """Begin a mission."""
         super().reset(seed=seed)
         self.close()
-        drawn = int(self.np_random.integers(SEED_LIMIT)) if seed is None else seed
+        drawn = int(self.np_random.integers(DRAWN_SEED_LIMIT)) if seed is None else seed
         self._mission = mission = Mission(self._simulator, seed=drawn)
         self._time_s = self._searched_s = self._distance_m = 0.0
         self._adaptations = 0

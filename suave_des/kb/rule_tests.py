@@ -18,6 +18,7 @@ from lxml import etree
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.files import Json
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.scale import TestedRegion, measurements_in, parse_region
@@ -164,7 +165,7 @@ def shipped_tests() -> tuple[Path, ...]:
     return tuple(sorted((shipped_folder("ontology") / "tests").glob("*.yaml")))
 
 
-def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str, Any]:
+def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> Json:
     """What a test is about in terms of a knowledge base."""
     base, reader = knowledge.base, FactReader(knowledge.base)
     reader.declare(test.given.facts)
@@ -399,7 +400,7 @@ def tests_text(
     return f"# {comment}\n{text}"
 
 
-def _given(state: KnowledgeState) -> dict[str, Any]:
+def _given(state: KnowledgeState) -> Json:
     given = {kind: content for kind, content in state_dict(state).items() if content}
     for name, value in state.measurements:  # numbers as numbers, where that is exact
         if Decimal(repr(float(value))) == value:

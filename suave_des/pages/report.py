@@ -36,8 +36,8 @@ from suave_des.results.mission import Adaptation, adaptations
 from suave_des.results.style import looks
 from suave_des.tables import capital
 
-LIMIT_BYTES: Final = 5_000_000
-PATHS: Final = 12
+PAGE_LIMIT_BYTES: Final = 5_000_000
+MOST_PATHS: Final = 12
 """Runs of each manager whose way is in a page."""
 _MOST_WAYS: Final = 120
 _STYLES: Final = ("common.css", "report.css")
@@ -57,7 +57,7 @@ _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 
 def report_page(
     folders: Sequence[Path],
-    runs: int = PATHS,
+    runs: int = MOST_PATHS,
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Make the report of campaigns, or of other results that `compare` reads.
@@ -84,8 +84,8 @@ def report_page(
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
     size = len(text.encode(errors="backslashreplace"))  # as it is written
-    if size > LIMIT_BYTES:
-        problem = f"the page would have {size / 1e6:.1f} MB, more than {LIMIT_BYTES / 1e6:g}"
+    if size > PAGE_LIMIT_BYTES:
+        problem = f"the page would have {size / 1e6:.1f} MB, more than {PAGE_LIMIT_BYTES / 1e6:g}"
         raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
     return text
 

@@ -522,7 +522,7 @@ _FAILED, _TASK, _ON = style.VERMILION, "#D9D9D9", "#9ECAE1"
 
 Rules = Mapping[tuple[float, str], Sequence[str]]
 """Names of the rules that made a function be adapted, by time (s) and function."""
-_Line = tuple[str, list[tuple[Span, str, str]]]
+_TimelineRow = tuple[str, list[tuple[Span, str, str]]]
 """A line of the chart: its name, and spans with colour and text."""
 
 
@@ -624,7 +624,7 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
     return [*times_s, record.end_s], [*altitudes_m, altitudes_m[-1]]
 
 
-def _lines(record: MissionRecord) -> Iterator[_Line]:
+def _lines(record: MissionRecord) -> Iterator[_TimelineRow]:
     """Yield the lines of the chart: tasks, the modes of each function, and failures."""
     yield "task", [(span, _TASK, plain(span.what)) for span in task_spans(record)]
     colours = style.MODE_COLOURS | mode_colours(record)
@@ -646,7 +646,7 @@ def _mode_colour(function: str, mode: str, colours: Mapping[str, str]) -> str:
     return style.ORANGE if "recover" in mode else _ON
 
 
-def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
+def _draw_lines(axes: Axes, lines: Sequence[_TimelineRow]) -> None:
     """Draw a bar for each span; the texts of a line are in its bars or behind them, or, where one
     has no room, all of them in a legend.
     """
