@@ -192,6 +192,9 @@ def resume_campaign(
 ) -> CampaignFrame:
     """Resume the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
+    Example:
+        frame = resume_campaign("simulated", runs=200, workers=2)
+
     Args:
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.

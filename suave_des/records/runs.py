@@ -196,6 +196,10 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     averages, blank rows and the header where it is repeated are left out. A column run_idx of the
     exemplar's pairs missions of one name, as a run's number and seed do those of a campaign.
 
+    Example:
+        missions = read_runs("simulated/runs.csv").frame
+        missions.groupby("manager")["search_time_s"].mean()
+
     Args:
         path: of the file; columns that are no metrics are numbers where all their values are, and
             else text.

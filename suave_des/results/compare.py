@@ -64,6 +64,10 @@ class Choices(TypedDict, total=False):
 def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions in folders or files of results.
 
+    Example:
+        found = compare_folders(["simulated"], metrics=["search_time_s"], against="none")
+        print(found.conclusion)
+
     Args:
         paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV
             files, or CSV files.

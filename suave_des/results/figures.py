@@ -579,7 +579,11 @@ def _folded(text: str, width: int = 26) -> str:
 
 @plain_arguments
 def draw_folder(folder: str | Path, out: str | Path) -> None:
-    """Draw the contents of a results folder, and write the picture; see draw_results."""
+    """Draw the contents of a results folder, and write the picture; see draw_results.
+
+    Example:
+        draw_folder("simulated", "simulated.pdf")
+    """
     draw_results([Path(folder)], Path(out))
 
 

@@ -809,6 +809,10 @@ def _claim_of_distance(less_others: Sequence[float]) -> str:
 def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) -> PaperComparison:
     """Compare the missions of a campaign with published figures.
 
+    Example:
+        runs = read_runs("simulated/runs.csv").frame
+        print(compare_with_paper(runs).table().text(95))
+
     Args:
         runs: with the columns of runs.csv.
         published: file of the published runs; managers that are not in it are left out. None: the

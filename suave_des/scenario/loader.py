@@ -102,6 +102,7 @@ def load_scenario(
 
     Files named inside a file are looked for beside it, then among the shipped ones.
 
+    Example:
         loaded = load_scenario("seams2023", reasoner="pellet")
 
     Args:
@@ -224,6 +225,7 @@ def _set(loaded: LoadedScenario, values: Mapping[str, object], option: str) -> L
 def with_values(loaded: LoadedScenario, values: Mapping[str, object]) -> LoadedScenario:
     """Replace the values at some key paths of a scenario.
 
+    Example:
         slower = with_values(loaded, {"signals.water_visibility.period_s": 120})
 
     Args:
