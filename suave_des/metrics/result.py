@@ -96,7 +96,8 @@ class MissionResult:
     """A mission's metrics, with the record of how it went if that was asked for.
 
     Example:
-        result = Simulator(load_scenario("seams2023")).run("metacontrol", run=1, seed=8, record=True)
+        simulator = Simulator(load_scenario("seams2023"))
+        result = simulator.run("metacontrol", run=1, seed=8, record=True)
         print(result.metrics.search_time_s, len(result.events))
     """
 

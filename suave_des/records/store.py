@@ -526,8 +526,8 @@ def write_campaign(
     files: Mapping[str, FileContent],
     suave: Mapping[str, FileContent],
 ) -> None:
-    """Write a campaign's manifest, which lists all others, and its files, of those in CAMPAIGN_FILES,
-    into the folder of its store, replacing those of an earlier use.
+    """Write a campaign's manifest, which lists all others, and its files, of those in
+    CAMPAIGN_FILES, into the folder of its store, replacing those of an earlier use.
 
     The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
     folder, or compare one file with the others, find what they expect.
