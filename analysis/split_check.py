@@ -34,8 +34,8 @@ def split_check(
 
     Args:
         fitted: by left-out manager, missions simulated with what was fitted without it; of each
-            frame only the rows of that manager count. Columns as of records.runs.COLUMNS, the place
-            of detection apart.
+            frame only the rows of that manager count. Columns as of records.runs.FRAME_COLUMNS, the
+            place of detection apart.
         published: the published missions, likewise.
 
     Returns:

@@ -24,10 +24,11 @@ if _TYPE_CHECKING:
     from suave_des.interfaces.gym import PipelineInspection
     from suave_des.interfaces.trees import PyTreesManager
     from suave_des.kb.knowledge_base import KnowledgeBase
-    from suave_des.managed.node import CustomFunction
+    from suave_des.managed.node import CustomFunction, FunctionContext, ProcessNode
     from suave_des.managing.base import ManagingSubsystem
     from suave_des.managing.metacontrol import Metacontrol
     from suave_des.managing.simple import NoManager, Threshold
+    from suave_des.metrics.result import MissionResult
     from suave_des.monitor.diagnostics import FAILED, Kind
     from suave_des.reality.missions import read_real
     from suave_des.reality.validation import compare_with_paper, validate
@@ -42,13 +43,16 @@ if _TYPE_CHECKING:
 
 __version__ = "1.0.0"
 
-__all__ = ["Mission", "RecordedMission", "Simulator", "load_scenario", "run_mission", "with_values"]
+__all__ = ["Mission", "MissionResult", "RecordedMission", "Simulator", "run_mission"]
+__all__ += ["load_scenario", "with_values"]
 __all__ += ["CampaignFrame", "read_ensemble", "resume_campaign", "run_campaign"]
 __all__ += [
     "CustomFunction",
+    "FunctionContext",
     "ManagingSubsystem",
     "Metacontrol",
     "NoManager",
+    "ProcessNode",
     "PyTreesManager",
     "Threshold",
 ]
@@ -76,10 +80,11 @@ _HOMES = {
         "interfaces.gym": ("PipelineInspection",),
         "interfaces.trees": ("PyTreesManager",),
         "kb.knowledge_base": ("KnowledgeBase",),
-        "managed.node": ("CustomFunction",),
+        "managed.node": ("CustomFunction", "FunctionContext", "ProcessNode"),
         "managing.base": ("ManagingSubsystem",),
         "managing.metacontrol": ("Metacontrol",),
         "managing.simple": ("NoManager", "Threshold"),
+        "metrics.result": ("MissionResult",),
         "monitor.diagnostics": ("FAILED", "Kind"),
         "records.runs": ("read_runs",),
         "resources": ("find",),

@@ -192,6 +192,9 @@ def resume_campaign(
 ) -> CampaignFrame:
     """Resume the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
+    Example:
+        frame = resume_campaign("simulated", runs=200, workers=2)
+
     Args:
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
@@ -207,16 +210,18 @@ def resume_campaign(
             error names it.
         WorkerError, StoreError: as run_campaign.
     """
-    changed: dict[str, Any] = {
-        "runs": runs,
-        "scheduler": scheduler,
-        "managers": managers,
-        "confirmed": confirmed,
-    }
     return _frame_of(
         folder,
         progress,
-        lambda show: campaigns.resume_campaign(folder, workers, on_progress=show, **changed),
+        lambda show: campaigns.resume_campaign(
+            folder,
+            workers,
+            runs=runs,
+            scheduler=scheduler,
+            managers=managers,
+            confirmed=confirmed,
+            on_progress=show,
+        ),
     )
 
 

@@ -14,7 +14,7 @@ from hashlib import sha256
 from importlib.metadata import version
 from inspect import CO_VARARGS, CO_VARKEYWORDS, isfunction, ismodule
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FunctionType
 from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
@@ -28,6 +28,7 @@ with warnings.catch_warnings(), hidden("yaml", even_if_loaded=True):
     warnings.simplefilter("ignore")
     import numba
     from numba.core import caching, compiler, serialize
+    from numba.core.dispatcher import Dispatcher
 numba.core.config._config_fname = os.devnull
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg,
@@ -50,7 +51,7 @@ _LIBRARIES = ("builtins", "math", "numba", "numpy")
 """What is in them is known by its name, as their versions are."""
 _DIGEST_BYTES = sha256().digest_size
 _MOST_FILES = 256
-_F = TypeVar("_F", bound=Callable[..., Any])
+_F = TypeVar("_F", bound=Callable[..., object])
 
 
 def compiled(function: _F) -> _F:
@@ -72,7 +73,7 @@ class Record(ctypes.Structure):
 
 
 _R = TypeVar("_R", bound=type[Record])
-_KINDS: dict[object, Any] = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
+_KINDS: dict[object, type] = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
 
 
 def record(kind: _R) -> _R:
@@ -97,7 +98,7 @@ def shared(records: ctypes.Array[Any]) -> Records:
     return np.frombuffer(memoryview(records), dtype)
 
 
-_dtypes: dict[type, np.dtype[Any]] = {}  # to make one takes as long as some flights
+_dtypes: dict[type, np.dtype[np.void]] = {}  # to make one takes as long as some flights
 
 
 def for_types_of(function: _F, *arguments: object) -> _F:
@@ -121,7 +122,7 @@ class _CodeCache(caching._Cache):
     else, or cannot be kept is compiled again.
     """
 
-    def __init__(self, dispatcher: Any) -> None:
+    def __init__(self, dispatcher: Dispatcher) -> None:
         self._dispatcher = dispatcher
 
     @property
@@ -199,7 +200,7 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
     Raises:
         ValueError: it is something of which that cannot be told.
     """
-    if isinstance(value, numba.core.dispatcher.Dispatcher):
+    if isinstance(value, Dispatcher):
         yield f"compiled with {sorted(value.targetoptions.items())}"
         value = value.py_func
     if str(getattr(value, "__module__", "")).partition(".")[0] in _LIBRARIES:
@@ -226,7 +227,7 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
         raise ValueError(f"unknown: {value!r}")
 
 
-def _of_function(function: Any, seen: list[object]) -> Iterator[str]:
+def _of_function(function: FunctionType, seen: list[object]) -> Iterator[str]:
     """Yield the ingredients of a function, and of the functions in it."""
     closed_over = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
     values = {**function.__globals__, **{name: cell.cell_contents for name, cell in closed_over}}

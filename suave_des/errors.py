@@ -20,7 +20,14 @@ _PLACE_LIMIT = 200
 
 
 class SuaveDesError(Exception):
-    """Base of every error that the command line prints as one line, without a traceback."""
+    """Base of every error that the command line prints as one line, without a traceback.
+
+    Example:
+        try:
+            run_campaign("mine.yaml", "mine:Manager", runs=100)
+        except SuaveDesError as error:
+            sys.exit(str(error))
+    """
 
 
 class InputError(SuaveDesError):
@@ -32,6 +39,12 @@ class InputError(SuaveDesError):
         place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s",
             or both.
         remedy: how to correct it.
+
+    Example:
+        try:
+            loaded = load_scenario("mine.yaml")
+        except InputError as error:
+            print(error.file, error.place, error.problem, error.remedy)
     """
 
     def __init__(
@@ -61,7 +74,14 @@ class KnowledgeError(InputError):
 
 
 class MissionError(SuaveDesError):
-    """A mission that could not be finished: names the manager, the run and the mission time."""
+    """A mission that could not be finished: names the manager, the run and the mission time.
+
+    Example:
+        try:
+            mission = run_mission("seams2023", "mine:Manager", run=1, seed=8)
+        except MissionError as error:
+            print(error.run, error.time_s, error.cause)
+    """
 
     def __init__(self, manager: str, run: int, time_s: float, cause: str) -> None:
         self.manager = manager

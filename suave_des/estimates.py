@@ -103,6 +103,9 @@ def mean_of(values: Sequence[float], groups: Sequence[int] | None = None) -> Est
 
     The interval holds well for samples of twenty and more.
 
+    Example:
+        print(mean_of([151.2, 89.0, 300.0]).text(".1f"))
+
     Args:
         values: the sample; their order makes no difference, as they are summed exactly.
         groups: the number of each value's group, if values of a group are alike; groups are then

@@ -33,6 +33,8 @@ _DEEPEST = 200
 _JSON_TEXT = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 _PART = ".part"
 
+Json = dict[str, Any]
+"""An object of JSON or YAML as it was read: what its values are is checked where they are used."""
 PAGES = ("replay.html", "report.html")
 """Files that are made beside the results of any family."""
 VALIDATION_FILES = (
@@ -75,7 +77,7 @@ FileContent = str | bytes | Iterable[str]
 Listing = Callable[[Mapping[str, str]], str]
 Noted = Mapping[str, Collection[str]]
 """SHA-256 of each file that was written, by its name: of now, and of before."""
-_Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None", object)
+_Rounded = TypeVar("_Rounded", float, "float | None", "str | int | float | bool | None", object)
 
 
 @contextmanager
@@ -252,7 +254,7 @@ def as_number(text: str) -> float:
         return math.nan
 
 
-def rounded(value: _Cell) -> _Cell:
+def rounded(value: _Rounded) -> _Rounded:
     """Round a number as in result files; what is no float stays."""
     # + 0.0: no minus before a zero
     return round(value, DECIMALS) + 0.0 if isinstance(value, float) else value

@@ -10,14 +10,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from types import FrameType
-from typing import Any
+from types import FrameType, TracebackType
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _REPEAT_S = 0.05
 _received: list[int] = []
 _blocks: list[int] = []  # of signals_raised that have not ended: at most one
-_Handler = Callable[[int, FrameType | None], object]
+_SignalHandler = Callable[[int, FrameType | None], object]
 
 
 class Stopped(KeyboardInterrupt):
@@ -53,7 +52,7 @@ def not_ignored() -> list[int]:
 
 
 @contextmanager
-def handled(numbers: Iterable[int], handler: _Handler) -> Iterator[None]:
+def handled(numbers: Iterable[int], handler: _SignalHandler) -> Iterator[None]:
     """Have a function called on signals in the block, which must be in the main thread."""
     before = {number: signal.signal(number, handler) for number in numbers}
     try:
@@ -74,7 +73,7 @@ def _repeated_if_lost() -> Iterator[None]:
     timers: list[threading.Timer] = []
     report = sys.unraisablehook
 
-    def again(lost: Any) -> None:
+    def again(lost: sys.UnraisableHookArgs) -> None:
         if not isinstance(lost.exc_value, Stopped):
             if not _received:
                 report(lost)
@@ -102,7 +101,9 @@ def _not_printed_by_extensions() -> Iterator[None]:
     """
     report = sys.excepthook
 
-    def printed(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    def printed(
+        kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    ) -> None:
         if not issubclass(kind, Stopped):
             report(kind, error, trace)
 

@@ -66,7 +66,7 @@ def read_file(path: Path) -> Learned:
     )
 
 
-def read_learned(path: Path) -> Mapping[str, Any]:
+def read_learned(path: Path) -> Mapping[str, object]:
     """Read a training result as read_file does, with immutable values, so that all missions find
     the same.
     """

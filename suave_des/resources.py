@@ -49,6 +49,9 @@ def hashes(paths: Iterable[Path], limit: int = 100_000_000) -> dict[str, str]:
 def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
     """Resolve a file that the user named: a path wins over the shipped file of that name.
 
+    Example:
+        published = find("seams2023_runs", "scenarios/published")
+
     Args:
         name: a path, or the name of a shipped file with or without its ending.
         kind: as of shipped_folder.

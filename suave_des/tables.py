@@ -32,6 +32,8 @@ capital within a word.
 _MARKDOWN = str.maketrans(
     {**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"}
 )
+TableRow = dict[str, Any]
+"""A row of a table of results: its values by column, of any type."""
 LATEX_NEEDS = r"% needs \usepackage{array,booktabs}"
 _LATEX_WIDTH_PT, _LATEX_COLUMN_PT = 345.0, 12.0
 """Text width of LaTeX's article, and what stands between two columns."""
@@ -292,9 +294,9 @@ class Written(ABC):
         return about | {name: rows_of(frame) for name, frame in self.frames().items()}
 
 
-def rows_of(frame: pandas.DataFrame) -> list[dict[str, Any]]:
+def rows_of(frame: pandas.DataFrame) -> list[TableRow]:
     """Return the rows of a frame as plain data."""
-    found: list[dict[str, Any]] = frame.astype(object).where(frame.notna(), None).to_dict("records")  # type: ignore[assignment]
+    found: list[TableRow] = frame.astype(object).where(frame.notna(), None).to_dict("records")  # type: ignore[assignment]
     return found
 
 

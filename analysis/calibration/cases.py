@@ -42,8 +42,8 @@ class Case:
     Attributes:
         name: that of its file, without `_campaign`.
         loaded: the scenario.
-        real: a row for each real mission, with the columns of records.runs.COLUMNS and the number
-            of its condition.
+        real: a row for each real mission, with the columns of records.runs.FRAME_COLUMNS and the
+            number of its condition.
         conditions: by number, the values of each condition by key path; none of a scenario that is
             no campaign's.
         shares: shares of missions in clusters, each with that of the real missions.

@@ -85,7 +85,7 @@ def _mean_distance(x: Vectors, y: Vectors) -> float:
 
 
 def as_vectors(missions: pandas.DataFrame) -> Vectors:
-    """Scale missions with the columns of records.runs.COLUMNS; shape (n, 3)."""
+    """Scale missions with the columns of records.runs.FRAME_COLUMNS; shape (n, 3)."""
     vectors: Vectors = missions[list(SCALES)].to_numpy(float) / np.array(list(SCALES.values()))
     return vectors
 

@@ -41,7 +41,7 @@ def code_versions() -> dict[str, str]:
     return {**versions(), "suave-des code": total.hexdigest()[:12], "machine": platform.machine()}
 
 
-def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
+def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, object]:
     """Return everything that determines a campaign's results, as plain data; `inputs` are those of
     check_campaign.
     """
@@ -65,7 +65,7 @@ def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def identity(decides: Mapping[str, Any]) -> str:
+def identity(decides: Mapping[str, object]) -> str:
     """Return the identity of a campaign, which added runs do not change, to tell it from others in
     its folder.
     """
@@ -73,7 +73,7 @@ def identity(decides: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
 
 
-def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
+def check_same(before: Mapping[str, object], now: Mapping[str, object], folder: Path) -> None:
     """Check that everything that determines results is unchanged, except for added runs, so that a
     campaign can resume.
 
@@ -90,7 +90,7 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
         raise InputError(problem, file=folder, remedy=remedy)
 
 
-def _differences(before: Any, now: Any, place: str) -> Iterator[tuple[str, Any, Any]]:
+def _differences(before: object, now: object, place: str) -> Iterator[tuple[str, Any, Any]]:
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for key in {**before, **now}:
             yield from _differences(

@@ -5,7 +5,7 @@ files.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
@@ -23,6 +23,7 @@ from suave_des.records.metrics import COLUMN_TYPES, COLUMNS, FOUND, PAPER_METRIC
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.records.store import MissionFailure, MissionKey, MissionOutcome
 from suave_des.registry import is_client
+from suave_des.tables import TableRow
 
 if TYPE_CHECKING:
     import pandas
@@ -54,7 +55,7 @@ class CampaignResult:
     campaign: Campaign
     done: int
     failures: tuple[MissionFailure, ...]
-    summary: tuple[dict[str, Any], ...]
+    summary: tuple[TableRow, ...]
     outcomes: Callable[[], Iterator[MissionOutcome]]
     remarks: tuple[str, ...]
 
@@ -108,7 +109,7 @@ class CampaignResult:
         types["manager"] = pandas.CategoricalDtype(list(self.campaign.spec.managers))
         return pandas.DataFrame.from_records(self.rows, columns=list(self.columns)).astype(types)
 
-    def differences(self) -> list[dict[str, Any]]:
+    def differences(self) -> list[TableRow]:
         """Return how managers differ, over the members of the ensemble, as in ensemble.csv; empty
         without one.
         """
@@ -118,7 +119,7 @@ class CampaignResult:
         found = differences(varied, self._kept(), self.campaign.spec.managers, _PLACES)
         return [{**each, **_swept(varied, each.pop("point"))} for each in found]
 
-    def report(self) -> dict[str, Any]:
+    def report(self) -> dict[str, object]:
         """Return how many missions were run, and what failed, as in manifest.json."""
         return {
             "missions": {
@@ -150,7 +151,7 @@ class CampaignResult:
             return kept  # no campaign of its own could fly the rest
         return f"{kept}; suave-des campaign --resume {self.folder} runs the rest"
 
-    def write(self, kept: store.Store, provenance: Mapping[str, Any]) -> None:
+    def write(self, kept: store.Store, provenance: Mapping[str, object]) -> None:
         """Write the campaign's files, with its provenance in the manifest, into the folder of its
         store, replacing earlier ones.
 
@@ -159,7 +160,7 @@ class CampaignResult:
         """
         spec = self.campaign.spec
         sweep = self.campaign.variation.sweep
-        about: dict[str, Any] = {"scenario": self.campaign.loaded.scenario.name}
+        about: dict[str, object] = {"scenario": self.campaign.loaded.scenario.name}
         about |= spec.model_dump(mode="json", include={"managers", "runs", "seed"})
         if labels := self.labels:
             about["labels"] = labels
@@ -179,7 +180,7 @@ class CampaignResult:
             kept, about, files, dict(self._suave_files()) if spec.suave_format else {}
         )
 
-    def _varied(self) -> dict[str, Any]:
+    def _varied(self) -> dict[str, object]:
         """Return what varies, for the manifest."""
         variation = self.campaign.variation
         ensemble = self.campaign.variation.ensemble
@@ -258,11 +259,11 @@ def gather(
     return CampaignResult(campaign, done, tuple(failures), summary, outcomes, tuple(remarks))
 
 
-def _swept(variation: Variation, point: int) -> dict[str, Any]:
+def _swept(variation: Variation, point: int) -> dict[str, object]:
     return {name: cell_of(value) for name, value in variation.sweep.values(point).items()}
 
 
-def _figures(rows: Iterable[tuple[int, Sequence[Any]]], runs_sharing_draw: int) -> Row:
+def _figures(rows: Iterable[tuple[int, Any]], runs_sharing_draw: int) -> Row:
     """Return the cells of summary.csv after the first; a figure that needs more missions than there
     are is None.
 

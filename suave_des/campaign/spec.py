@@ -60,11 +60,11 @@ class CampaignKeys(Strict):
         Real, Field(gt=0, le=1e6), Option("SECONDS", "120; with the reasoner owlready2 1800")
     ] = 120.0
     """Wall-clock limit for a mission, in s."""
-    sweep: dict[str, Any] = Field(default_factory=dict)
+    sweep: dict[str, object] = Field(default_factory=dict)
     """Lists of values by key path of the scenario, each combined with each; or a mapping with
     `grid` (the same) and `zip` (lists of which the first values go together, then the second),
     which are combined with each other. Each parameter is a column of runs.csv."""
-    perturbations: dict[str, Any] = Field(default_factory=dict)
+    perturbations: dict[str, object] = Field(default_factory=dict)
     """Distributions by key path of the scenario: each run draws its own value, the same under all
     managers and at all points. Each is a column of runs.csv."""
     runs_per_draw: Annotated[Whole, Field(ge=1, le=RUNS_LIMIT)] = 1
@@ -113,7 +113,7 @@ class CampaignSpec(CampaignKeys):
     """Where relative paths begin."""
 
     @classmethod
-    def of(cls, scenario: str | Path, **options: Any) -> Self:
+    def of(cls, scenario: str | Path, **options: object) -> Self:
         """Make a specification from options by name; None leaves one to the campaign file, or to
         the defaults.
 
@@ -134,7 +134,7 @@ class CampaignSpec(CampaignKeys):
         )
 
     @classmethod
-    def read(cls, data: Mapping[str, Any]) -> Self:
+    def read(cls, data: Mapping[str, object]) -> Self:
         """Make a specification of plain data.
 
         Raises:
@@ -146,7 +146,7 @@ class CampaignSpec(CampaignKeys):
             keys, problem, remedy = problem_and_remedy(error, dict(data), cls)
             raise InputError(f"{'.'.join(map(str, keys))}: {problem}", remedy=remedy) from None
 
-    def stored(self) -> dict[str, Any]:
+    def stored(self) -> dict[str, object]:
         """Return what a resumed campaign needs, as plain data: not how and where it runs, which may
         differ then.
         """

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -26,7 +26,7 @@ ENSEMBLE_COLUMN = "ensemble_member"
 _CHECKED_POINTS = 300
 """Of sweeps with more values, so many are checked before anything runs."""
 
-Values = Annotated[tuple[Any, ...], Field(min_length=1)]
+Values = Annotated[tuple[object, ...], Field(min_length=1)]
 
 
 class Sweep(Strict):
@@ -63,7 +63,7 @@ class Sweep(Strict):
         """Number of points; 1 if nothing is swept."""
         return math.prod(self._sizes())
 
-    def values(self, point: int) -> dict[str, Any]:
+    def values(self, point: int) -> dict[str, object]:
         """Return the value of each parameter at a point."""
         import numpy as np
 
@@ -80,7 +80,7 @@ class Sweep(Strict):
             stride = math.prod(sizes[place + 1 :])
             yield from range(0, size * stride, stride)
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, object]:
         """Return it as plain data, without parts that are not used."""
         return {form: content for form, content in self.model_dump(mode="json").items() if content}
 
@@ -88,7 +88,7 @@ class Sweep(Strict):
         return (*map(len, self.grid.values()), len(next(iter(self.zip.values()), (None,))))
 
 
-def plain(given: Any) -> Any:
+def plain(given: object) -> object:
     """Convert what a caller gives to the form of a file: arrays, ranges and series become lists,
     paths text.
     """
@@ -103,7 +103,7 @@ def plain(given: Any) -> Any:
     return [plain(each) for each in given]
 
 
-def cell_of(value: Any) -> str | int | float | bool | None:
+def cell_of(value: object) -> str | int | float | bool | None:
     """Return a parameter's value as in runs.csv: lists and mappings as JSON."""
     if value is None or isinstance(value, str | int | float | bool):
         return value
@@ -171,8 +171,8 @@ class Variation:
 
 def vary(
     loaded: LoadedScenario,
-    sweep: Mapping[str, Any],
-    perturbations: Mapping[str, Any],
+    sweep: Mapping[str, object],
+    perturbations: Mapping[str, object],
     runs_per_draw: int,
 ) -> tuple[LoadedScenario, Variation]:
     """Put the distributions of perturbations into a scenario; return it with the variation.
@@ -216,18 +216,18 @@ def vary(
     return loaded, variation
 
 
-def _check_once(place: str, columns: Sequence[Sequence[Any]]) -> None:
+def _check_once(place: str, columns: Sequence[Sequence[object]]) -> None:
     """Check that no two rows of a sweep's values are equal, as 1 and 1.0 are."""
     points = [tuple(map(_comparable, row)) for row in zip(*columns, strict=True)]
     if len(set(points)) < len(points):
         raise InputError("has a point twice", place=place, remedy="give each point once")
 
 
-def _comparable(value: Any) -> float | str:
+def _comparable(value: object) -> float | str:
     return float(value) if isinstance(value, int | float) else repr(value)
 
 
-def _sweep(given: Mapping[str, Any]) -> tuple[Sweep, dict[str, str]]:
+def _sweep(given: Mapping[str, object]) -> tuple[Sweep, dict[str, str]]:
     """Read a sweep; return it with the place of each parameter in what was given."""
     forms = [form for form in ("grid", "zip") if form in given]
     data = dict(given) if forms else {"grid": given}

@@ -4,7 +4,7 @@ summaries.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, islice
@@ -12,7 +12,7 @@ from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -25,7 +25,7 @@ from suave_des.cli.options import (
     ManagerOptions,
     Overwrite,
     Quiet,
-    Scenario,
+    ScenarioArgument,
     Seed,
     Trusted,
     any_scenario,
@@ -38,7 +38,7 @@ from suave_des.cli.options import (
 from suave_des.errors import InputError, number_of
 from suave_des.files import FAMILIES, check_beside, write_beside
 from suave_des.resources import DEFAULT_SCENARIO
-from suave_des.tables import Table
+from suave_des.tables import Table, TableRow
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
@@ -149,7 +149,7 @@ def _summary(result: CampaignResult) -> Table:
     from suave_des.estimates import percent
     from suave_des.records.metrics import METRICS, PAPER_METRICS
 
-    def figures(cells: Mapping[str, Any], metric: str) -> tuple[str, str]:
+    def figures(cells: TableRow, metric: str) -> tuple[str, str]:
         mean, low, high, std = (
             cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std")
         )
@@ -167,7 +167,7 @@ def _summary(result: CampaignResult) -> Table:
         )
         found = "" if cells["found_share"] is None else percent(cells["found_share"])
         measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
-        manager = result.labels.get(cells["manager"], cells["manager"])
+        manager = result.labels.get(cells["manager"], str(cells["manager"]))
         rows.append([*swept, manager, str(cells["n"]), found, *measured])
     title = f"{result.campaign.loaded.scenario.name}, seed {result.campaign.spec.seed}: means ± half their 95% intervals"
     means = [heading for metric in PAPER_METRICS for heading in (METRICS[metric].brief, "std")]
@@ -175,7 +175,7 @@ def _summary(result: CampaignResult) -> Table:
     return Table(headings, rows, f"{title}, standard deviations", f"{'r' * len(parameters)}l")
 
 
-def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Table:
+def _differences(found: Sequence[TableRow], parameters: Sequence[str]) -> Table:
     """How managers differ, and in how many of the ensemble's parameter sets they do so in the same
     direction.
     """
@@ -290,7 +290,7 @@ def reproduce(
 
 
 def run(
-    scenario: Scenario,
+    scenario: ScenarioArgument,
     *,
     options: Annotated[
         Given,
@@ -408,7 +408,7 @@ class _Served:
 
 
 def serve(
-    scenario: Scenario,
+    scenario: ScenarioArgument,
     *,
     options: Annotated[
         Given,

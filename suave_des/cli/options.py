@@ -50,7 +50,7 @@ complete_managers = _completing(lambda: import_module("suave_des.registry").mana
 complete_metrics = _completing(lambda: import_module("suave_des.records.metrics").METRICS)
 complete_scenarios = _completing(_scenarios)
 
-Scenario = Annotated[
+ScenarioArgument = Annotated[
     str,
     typer.Argument(
         metavar="SCENARIO",
@@ -66,7 +66,7 @@ Modes = Annotated[
     Path | None,
     typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's."),
 ]
-Reasoner = Annotated[
+ReasonerOption = Annotated[
     str | None,
     typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow)."),
 ]
@@ -88,12 +88,14 @@ def managers_option(text: str, default: str | None = None, *names: str) -> Any:
     """Declare an option that takes names of managers, with its help, its default as shown, and
     further names for it.
     """
-    settings: dict[str, Any] = {
-        "metavar": "NAME,...",
-        "help": text,
-        "autocompletion": complete_managers,
-    }
-    return typer.Option("--managers", *names, show_default=default or True, **settings)
+    return typer.Option(
+        "--managers",
+        *names,
+        metavar="NAME,...",
+        help=text,
+        show_default=default or True,
+        autocompletion=complete_managers,
+    )
 
 
 def _quiet(context: typer.Context, value: bool) -> bool:
@@ -160,7 +162,7 @@ class Fields:
             else:
                 yield _keyword(name, None, Annotated[kind | None, given])
 
-    def taken(self, given: dict[str, Any]) -> Given:
+    def taken(self, given: Given) -> Given:
         """Take what is given from a command's arguments; of names, there may be several, with
         commas between them.
         """
@@ -182,18 +184,18 @@ def _flag(name: str) -> str:
     return f"--{name.removesuffix('_s').replace('_', '-')}"
 
 
-def _types_in(annotation: Any) -> set[Any]:
+def _types_in(annotation: object) -> set[object]:
     parts = get_args(annotation)
     return {getattr(annotation, "__origin__", annotation)}.union(*map(_types_in, parts))
 
 
-def _written(default: Any) -> str:
+def _written(default: object) -> str:
     if isinstance(default, tuple):
         return ",".join(default)
     return str(default) if _is_given(default) else ""
 
 
-def flags(given: Given) -> dict[str, Any]:
+def flags(given: Given) -> dict[str, object]:
     """Name what is given by its options: {"--time-out": 60.0}."""
     return {_flag(name): value for name, value in given.items()}
 
@@ -242,7 +244,7 @@ class KnowledgeFiles:
         return changed | {name: value or () for name, value in files.items()}  # type: ignore[return-value]
 
     @property
-    def values(self) -> dict[str, Any]:
+    def values(self) -> dict[str, object]:
         """New values of the scenario, by key path."""
         return dict(key_and_value(word, "--set") for word in self.set or ())
 
@@ -252,7 +254,7 @@ class Files(KnowledgeFiles):
     """Options that replace or add to all of a scenario's files and values."""
 
     modes: Modes = None
-    reasoner: Reasoner = None
+    reasoner: ReasonerOption = None
 
     @property
     def replacements(self) -> Replacements:
@@ -283,7 +285,7 @@ def comma_separated(names: str | None) -> tuple[str, ...]:
     return tuple(name.strip() for name in (names or "").split(",") if name.strip())
 
 
-def key_and_value(word: str, option: str) -> tuple[str, Any]:
+def key_and_value(word: str, option: str) -> tuple[str, object]:
     """Split KEY=VALUE; the value is read as in a YAML file.
 
     Raises:
@@ -409,7 +411,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
     last: list[inspect.Parameter] = []
-    groups: dict[str, Callable[[dict[str, Any]], Any]] = {}
+    groups: dict[str, Callable[[Given], object]] = {}
     for each in inspect.signature(command).parameters.values():
         hint = hints[each.name]
         if declared := [part for part in get_args(hint) if isinstance(part, Fields)]:
@@ -431,11 +433,11 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_groups
 
 
-def _keyword(name: str, default: object, annotation: Any) -> inspect.Parameter:
+def _keyword(name: str, default: object, annotation: object) -> inspect.Parameter:
     return inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
     )
 
 
-def _group(kind: Any, given: dict[str, Any]) -> Any:
+def _group(kind: Any, given: Given) -> object:
     return kind(**{each.name: given.pop(each.name) for each in fields(kind)})

@@ -166,13 +166,13 @@ _BEFORE_START: Final = re.compile(
 )
 
 
-def _time_before_start_s(event: Any) -> float | None:
+def _time_before_start_s(event: object) -> float | None:
     """Return the time of a thruster event that is before the start; None if it is not."""
     match = _BEFORE_START.fullmatch(event) if isinstance(event, str) else None
     return None if match is None else float(match[2])
 
 
-def _from_start(events: Any) -> Any:
+def _from_start(events: object) -> object:
     """Return thruster events of which those before the start are at the start: the exemplar
     triggers them at its first tick.
     """
@@ -190,7 +190,7 @@ def _from_start(events: Any) -> Any:
 class SourcedValue(NamedTuple):
     """A value of the scenario, where it comes from, and its parameter; None: it is a default."""
 
-    value: Any
+    value: object
     comment: str
     parameter: Parameter | None = None
 
@@ -485,7 +485,7 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
         yield Experiment(place, manager, each.num_runs, is_extended, each.experiment_launch, level)
 
 
-def _not_simulated(place: str, node: str, given: Mapping[str, Any]) -> Iterator[str]:
+def _not_simulated(place: str, node: str, given: Mapping[str, object]) -> Iterator[str]:
     """Yield a note for each key of an experiment or launch that is not in the table."""
     for name, value in given.items():
         if (node, name) not in PATHS:
@@ -550,7 +550,7 @@ def _battery_constraint(
     return {"battery.mission_ends_at_level": SourcedValue(level, "battery_constraint_value")}
 
 
-Entries = dict[tuple[str, ...], tuple[Any, str]]
+Entries = dict[tuple[str, ...], tuple[object, str]]
 """Values with their comments by key path, as lines of a YAML file."""
 
 

@@ -24,6 +24,7 @@ from suave_des.exemplar.keys import (
     is_since,
     read_by,
 )
+from suave_des.files import Json
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.models import ThrusterEvent, mean
 from suave_des.scenario.yamlfile import Layer, Location, parse_yaml
@@ -36,7 +37,7 @@ _DIGITS = 9
 
 
 def export_config(
-    loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str | None = None
+    loaded: LoadedScenario, campaign: Json, revision: str | None = None
 ) -> tuple[dict[str, str], tuple[str, ...]]:
     """Write a scenario and a campaign as the exemplar's mission and runner files. No file is
     written.
@@ -92,7 +93,7 @@ def _publishing_period(loaded: LoadedScenario) -> dict[str, float]:
     return {f"signals.{WATER_VISIBILITY}.publishing_period_s": period_s}
 
 
-def _lost_campaign(campaign: Mapping[str, object], again: str | None) -> Iterator[str]:
+def _lost_campaign(campaign: Json, again: str | None) -> Iterator[str]:
     """Yield what of a campaign is lost; `again` is what is imported again, None without runner."""
     given = {key: value for key, value in campaign.items() if value not in (None, {}, [])}
     if again is not None:
@@ -239,9 +240,7 @@ def _value(loaded: LoadedScenario, path: str, default: object) -> object:
     return value if is_text or type(value) is type(default) else None
 
 
-def _runner_of(
-    loaded: LoadedScenario, campaign: Mapping[str, Any], revision: str
-) -> dict[str, object]:
+def _runner_of(loaded: LoadedScenario, campaign: Json, revision: str) -> dict[str, object]:
     """The parameters that only the runner has; an InputError if the exemplar has none of the
     managers.
     """
@@ -300,7 +299,7 @@ def _experiment(
 
 
 def _differences(
-    here: Mapping[str, Any], there: Mapping[str, Any], above: str = ""
+    here: Mapping[str, object], there: Mapping[str, object], above: str = ""
 ) -> Iterator[str]:
     """Yield a line for each key of which the exemplar has another value."""
     for key in dict.fromkeys((*here, *there)):
@@ -318,6 +317,6 @@ def _differences(
             yield f"{above}{key}: {one['kind']} here, {other['kind']} in the exemplar"
 
 
-def _rounded(value: Any) -> Any:
+def _rounded(value: object) -> Any:
     """Plain data without rounding errors."""
     return json.loads(json.dumps(value), parse_float=lambda text: float(f"{float(text):.9g}"))

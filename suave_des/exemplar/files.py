@@ -149,7 +149,7 @@ def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
 
 
 def _unread(
-    document: Layer, entry: str, given: Mapping[str, Any], read: Collection[str]
+    document: Layer, entry: str, given: Mapping[str, object], read: Collection[str]
 ) -> Iterator[str]:
     """Yield notes about what no node gets of an entry with these parameters."""
     place = f"{document.path}: line {document.place((entry,)).line}, {entry.removeprefix('/')}"
@@ -164,7 +164,7 @@ def _unread(
         yield f"{place}: not imported: {names}: the node is not known ({remedy})"
 
 
-def _content(document: Layer, entry: str) -> dict[str, Any]:
+def _content(document: Layer, entry: str) -> dict[str, object]:
     """Return the parameters of a file's entry; an InputError if it is no node's."""
     content = document.data[entry]
     given = content.get(PARAMETERS, "") if isinstance(content, dict) else ""
@@ -184,7 +184,7 @@ def _content(document: Layer, entry: str) -> dict[str, Any]:
 
 
 def _of_entry(
-    document: Layer, entry: str, given: Mapping[str, Any], *, is_runners: bool
+    document: Layer, entry: str, given: Mapping[str, object], *, is_runners: bool
 ) -> Iterator[Parameter]:
     """Yield the parameters of an entry, each for every node that gets it.
 
@@ -201,7 +201,7 @@ def _of_entry(
             yield Parameter(document, entry, name, value, node)
 
 
-def _compact(events: Any) -> Any:
+def _compact(events: object) -> object:
     """Return thruster events without spaces, and without empty ones, as ROS 2 writes an empty
     list.
     """
@@ -211,7 +211,7 @@ def _compact(events: Any) -> Any:
     return ["".join(each.split()) if isinstance(each, str) else each for each in full]
 
 
-def _full(entries: Any) -> list[int]:
+def _full(entries: object) -> list[int]:
     """Return the indices of a list's entries that are not empty texts."""
     if not isinstance(entries, list):
         return []

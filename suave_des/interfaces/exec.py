@@ -24,13 +24,13 @@ from itertools import chain
 from math import inf
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 from weakref import WeakSet, finalize
 
 from suave_des.clock import call_at, until
 from suave_des.domain import Task
 from suave_des.errors import InputError, PassingError, did_you_mean, shown
-from suave_des.files import json_value
+from suave_des.files import Json, json_value
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
@@ -102,7 +102,7 @@ class _Program:
         self._poll.register(self._out, select.POLLIN)
         self._rest = b""
 
-    def ask(self, message: Mapping[str, Any], time_out_s: float) -> dict[str, Any]:
+    def ask(self, message: Mapping[str, object], time_out_s: float) -> Json:
         """Send a message, and return its answer."""
         if self.has_ended:
             raise ProgramError("was ended after an error")
@@ -221,7 +221,7 @@ class ExecManager(ManagingSubsystem):
     command: ClassVar[str]
 
     @classmethod
-    def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
+    def input_files(cls, settings: Mapping[str, object]) -> Collection[str]:
         """The files that the command names, and the one that its setting `learned` names."""
         words = shlex.split(cls.command)
         return (*(word for word in words if Path(word).is_file()), *super().input_files(settings))
@@ -238,7 +238,7 @@ class ExecManager(ManagingSubsystem):
             )
         self._thinks_until_s = 0.0
         self._depends_on: Dependencies | None = None
-        self._begin: dict[str, Any] = {}
+        self._begin: Json = {}
         self._program: _Program | None = None
         self._give_back: Callable[[], object] = lambda: None
 
@@ -251,7 +251,7 @@ class ExecManager(ManagingSubsystem):
         except InputError:
             return word
 
-    def recall(self, learned: Mapping[str, Any], training: bool) -> None:
+    def recall(self, learned: Mapping[str, object], training: bool) -> None:
         """Tell the program what there is, and take its settings."""
         system = self.system
         settings = {
@@ -279,7 +279,7 @@ class ExecManager(ManagingSubsystem):
             raise self._error(f"answered {shown(answer)} to mission_started: {error}") from None
         self._begin = answer
 
-    def _take_settings(self, answer: dict[str, Any]) -> None:
+    def _take_settings(self, answer: Json) -> None:
         period_s = answer.pop("period_s", None)
         self.period_s = None if period_s is None else float(period_s)
         self.starts_s = float(answer.pop("starts_s", 0.0))
@@ -328,14 +328,14 @@ class ExecManager(ManagingSubsystem):
         self._carry_out(answer)
         return None
 
-    def _adapt_at(self, due_s: float, answer: Mapping[str, Any]) -> AdaptationProcess:
+    def _adapt_at(self, due_s: float, answer: Json) -> AdaptationProcess:
         yield until(self.system.env, due_s)
         self._carry_out(answer)
 
-    def _tell(self, kind: str, /, **content: Any) -> None:
+    def _tell(self, kind: str, /, **content: object) -> None:
         self._act(self._ask(kind, **content))
 
-    def _act(self, answer: Mapping[str, Any]) -> None:
+    def _act(self, answer: Json) -> None:
         """Carry out an answer when the program has thought of it."""
         due_s = self._due_s(answer)
         if due_s > self.system.now_s:
@@ -343,7 +343,7 @@ class ExecManager(ManagingSubsystem):
         else:
             self._carry_out(answer)
 
-    def _due_s(self, answer: Mapping[str, Any]) -> float:
+    def _due_s(self, answer: Json) -> float:
         """Return when the program has thought of an answer: it thinks of one after the other."""
         latency_s = answer.get("latency_s", 0.0)
         if type(latency_s) not in (int, float) or not 0.0 <= latency_s <= _LONGEST_S:
@@ -352,7 +352,7 @@ class ExecManager(ManagingSubsystem):
         self._thinks_until_s = max(self.system.now_s, self._thinks_until_s) + latency_s
         return self._thinks_until_s
 
-    def _ask(self, kind: str, /, **content: Any) -> dict[str, Any]:
+    def _ask(self, kind: str, /, **content: object) -> Json:
         if self._program is None:
             self._program = program = _take(self._command)
             # A mission that does not end leaves it to another one when nobody refers to it any more.
@@ -377,7 +377,7 @@ class ExecManager(ManagingSubsystem):
             answer.setdefault("latency_s", took_s * self._real_thinking)
         return answer
 
-    def _carry_out(self, answer: Mapping[str, Any]) -> None:
+    def _carry_out(self, answer: Json) -> None:
         modes = answer.get("modes", {})
         lines = answer.get("log", ())
         if not isinstance(modes, dict) or not isinstance(lines, list | tuple):

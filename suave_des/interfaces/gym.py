@@ -30,7 +30,7 @@ from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
 NOT_MEASURED: Final = -1.0
-SEED_LIMIT: Final = 2**31
+DRAWN_SEED_LIMIT: Final = 2**31
 _SPREADS: Final = 6.0
 """So many standard deviations are taken for the bounds of a normal distribution that has none."""
 REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
@@ -126,12 +126,12 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._needed: frozenset[str] = frozenset()
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Observation, dict[str, object]]:
         """Begin a mission."""
         super().reset(seed=seed)
         self.close()
-        drawn = int(self.np_random.integers(SEED_LIMIT)) if seed is None else seed
+        drawn = int(self.np_random.integers(DRAWN_SEED_LIMIT)) if seed is None else seed
         self._mission = mission = Mission(self._simulator, seed=drawn)
         self._time_s = self._searched_s = self._distance_m = 0.0
         self._adaptations = 0
@@ -142,7 +142,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def step(
         self, action: Sequence[int] | NDArray[np.int64]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    ) -> tuple[Observation, float, bool, bool, dict[str, object]]:
         """Request the modes of an action, and advance by a period."""
         mission = self._mission
         if mission is None:
@@ -244,7 +244,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         values += self._mode_indices
         return np.array(values, np.float32)
 
-    def _info(self, mission: Mission) -> dict[str, Any]:
+    def _info(self, mission: Mission) -> dict[str, object]:
         """Return mission time and task; at the end the metrics."""
         now = {
             "time_s": min(self._time_s, mission.now_s),

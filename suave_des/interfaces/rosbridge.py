@@ -13,12 +13,12 @@ import logging
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
-from typing import Any, Final, Self
+from typing import Final, Self
 
 from scipy.spatial.transform import Rotation
 from websockets.asyncio.server import ServerConnection, serve
@@ -29,13 +29,12 @@ from suave_des.campaign.missions import Campaign, Finished, MissionRunner, Remar
 from suave_des.clock import call_at, tick_at_or_after
 from suave_des.domain import DEFAULT_MODE, Task
 from suave_des.errors import InputError, did_you_mean, shown, unknown
-from suave_des.files import json_value
+from suave_des.files import Json, json_value
 from suave_des.interfaces.client import CANCEL_TASK, REQUEST_TASK, ClientManager
 from suave_des.interfaces.serve import (
     ADVANCE,
     BODY_LIMIT_BYTES,
     LATENCY,
-    Json,
     RefusedError,
     Senders,
     Session,
@@ -143,7 +142,7 @@ class _Client:
     level: str = "error"
     out: asyncio.Queue[str] = field(default_factory=asyncio.Queue)
 
-    def send(self, op: str, **content: Any) -> None:
+    def send(self, op: str, **content: object) -> None:
         """Send a message."""
         self.out.put_nowait(json.dumps({"op": op, **content}))
 
@@ -370,7 +369,7 @@ class Bridge:
             next_s = partial(tick_at_or_after, phase_s=0.0, period_s=period_s)
             yield _Timer(next_s, partial(self._publish, topic, message))
 
-    def _publish(self, topic: str, message: Callable[[], Any]) -> None:
+    def _publish(self, topic: str, message: Callable[[], object]) -> None:
         """Publish a message, which is made only if somebody subscribes to the topic."""
         body = ""
         for client in self._clients:
@@ -491,7 +490,7 @@ class Bridge:
         answer = {"service": service, "values": values, "result": isinstance(values, dict)}
         client.send("service_response", **answer, **_id_of(message))
 
-    def _served(self, service: str, given: Any) -> Json:
+    def _served(self, service: str, given: object) -> Json:
         if service == ADVANCE_SERVICE:
             step_s = seconds(_arguments(given, (ADVANCE,)).get(ADVANCE))
             self._advance(self._mission.now_s + max(step_s, _LATER_S))
@@ -571,7 +570,7 @@ def _number(message: Json, key: str) -> float:
     return float(value)
 
 
-def _arguments(given: Any, names: Sequence[str]) -> Json:
+def _arguments(given: object, names: Sequence[str]) -> Json:
     """Return the arguments of a call by name; rosbridge takes them in order, too."""
     return object_of(
         dict(zip(names, given, strict=False)) if isinstance(given, list) else given, names
@@ -583,7 +582,7 @@ def _check_is_clients(topic: str) -> None:
         raise InputError(f"{topic} is published by the mission", remedy="give another topic")
 
 
-def _check_room(names: dict[str, Any], name: str) -> None:
+def _check_room(names: Collection[str], name: str) -> None:
     if name not in names and len(names) >= _MOST_NAMES:
         raise InputError(f"this client has {_MOST_NAMES} of them", remedy="give one up first")
 

@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
-from suave_des.files import json_value
+from suave_des.files import Json, json_value
 from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
@@ -64,7 +64,6 @@ _MEANINGS: Final = {
     "yaw_rad": "attitude; 0 is east, positive to the north",
 }
 """Of the names in /monitor that every scenario has."""
-Json = dict[str, Any]
 
 
 class Session:
@@ -103,7 +102,7 @@ class Session:
         self._record = record
         self._thought_s = 0.0
         self._lock = threading.Lock()
-        self._paths: dict[tuple[str, str], Callable[[Any], Json]] = {
+        self._paths: dict[tuple[str, str], Callable[[object], Json]] = {
             ("GET", "/"): lambda _: dict(REQUESTS),
             ("GET", "/monitor"): lambda _: self._monitor(),
             ("PUT", "/execute"): self._execute,
@@ -138,7 +137,7 @@ class Session:
         if manager.system.modes.requests > requests:
             manager.reasoning_time_s += thought_s
 
-    def answer(self, method: str, path: str, content: Any) -> Json:
+    def answer(self, method: str, path: str, content: object) -> Json:
         """Answer a request.
 
         Raises:
@@ -181,7 +180,7 @@ class Session:
             function: list(grounding_modes(modes)) for function, modes in self.mission.modes.items()
         }
 
-    def _execute(self, content: Any) -> Json:
+    def _execute(self, content: object) -> Json:
         mission = self.mission
         wanted = object_of(content, (*mission.modes, ADVANCE, LATENCY))
         # UPISAS sends every key of the schema: null leaves things as they are, like a key that is
@@ -200,12 +199,12 @@ class Session:
         """Say what mission time it is."""
         return {"time_s": round(self.mission.now_s, 6), "is_over": self.mission.is_over}
 
-    def _advance(self, content: Any) -> Json:
+    def _advance(self, content: object) -> Json:
         wanted = object_of(content, (ADVANCE,))
         self.mission.advance(self.mission.now_s + seconds(wanted.get(ADVANCE)))
         return self._monitor()
 
-    def _start(self, content: Any) -> Json:
+    def _start(self, content: object) -> Json:
         wanted = object_of(content, ("run", "seed"))
         self._begin(wanted.get("run", self._run), wanted.get("seed", self._seed))
         self.mission.advance(self.due_s())
@@ -260,7 +259,7 @@ def check_factor(factor: float) -> None:
         )
 
 
-def object_of(content: Any, known: Sequence[str]) -> Json:
+def object_of(content: object, known: Sequence[str]) -> Json:
     """Return a copy of an object, which may have no other keys than the known ones."""
     if not isinstance(content, dict):
         problem = f"expected an object, got {shown(content)}"
@@ -330,7 +329,7 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     timeout = _READ_TIMEOUT_S
 
-    def log_message(self, format: str, *arguments: Any) -> None:
+    def log_message(self, format: str, *arguments: object) -> None:
         """Write no log line for each request."""
 
     def do_GET(self) -> None:
@@ -381,7 +380,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self.command != "HEAD":
             self.wfile.write(body)
 
-    def _content(self) -> Any:
+    def _content(self) -> object:
         length = self.headers.get("Content-Length", "0")
         kind = self.headers.get_content_type()
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
@@ -442,7 +441,7 @@ class Server(ThreadingHTTPServer):
         with usable(host, port):
             super().__init__((host, port), _Handler)
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(self, request: Any, client_address: object) -> None:
         """Let clients leave in the middle of a request or an answer; report anything else."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)

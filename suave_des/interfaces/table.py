@@ -12,7 +12,7 @@ from functools import cache, lru_cache
 from itertools import chain, product
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import yaml
 
@@ -67,7 +67,7 @@ class TableManager(Metacontrol):
         return cls.name.removeprefix("table:")
 
     @classmethod
-    def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
+    def input_files(cls, settings: Mapping[str, object]) -> Collection[str]:
         """The table, unless it is shipped."""
         return () if cls.name == cls._file() else (cls._file(),)
 
@@ -167,7 +167,7 @@ Rosa = _named("Rosa", "rosa")
 Planta = _named("Planta", "planta")
 
 
-def opened(path: Path, settings: Mapping[str, Any]) -> DecisionTable:
+def opened(path: Path, settings: Mapping[str, object]) -> DecisionTable:
     """Read a table, once for all missions as long as it is the same.
 
     Raises:

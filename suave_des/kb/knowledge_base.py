@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rdflib
 from rdflib.namespace import RDFS
@@ -107,7 +107,7 @@ class KnowledgeBase:
         reasoner: str | None = None,
         rules: str | Path | Sequence[str | Path] = (),
         disabled_rules: str | Sequence[str] = (),
-        values: Mapping[str, Any] | None = None,
+        values: Mapping[str, object] | None = None,
         time_limit_s: float = TIME_LIMIT_S,
     ) -> KnowledgeBase:
         """Read ontologies and start a reasoner on them.

@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its 
 FLIP_FLOP: Final = "flip-flop"
 _EXAMPLES: Final = 5
 #: Functions that have an objective, and (function, design) of those that are grounded.
-_Task = tuple[tuple[str, ...], tuple[tuple[str, str], ...]]
+_TaskState = tuple[tuple[str, ...], tuple[tuple[str, str], ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,7 @@ def _flipping(
     """Functions of each state whose decisions lead through other groundings back to its own, all
     else being equal.
     """
-    after: dict[_Task, _Task] = {}
+    after: dict[_TaskState, _TaskState] = {}
     for state, outcome in zip(states, outcomes, strict=True):
         asked = tuple(each.function for each in state.objectives)
         designs = dict(state.groundings)
@@ -183,7 +183,7 @@ def _flipping(
         yield tuple(name for name in start[0] if len({each.get(name) for each in ways}) > 1)
 
 
-def _round_trip(after: dict[_Task, _Task], start: _Task) -> list[_Task]:
+def _round_trip(after: dict[_TaskState, _TaskState], start: _TaskState) -> list[_TaskState]:
     """The tasks that follow one another from one until it comes again; none where it does not."""
     way = [start]
     while (following := after[way[-1]]) in after and following not in way:
@@ -242,7 +242,7 @@ def function_table(policy: Policy, function: str) -> tuple[Table, int, str]:
 
 
 def _merged(
-    found: Mapping[tuple[str, ...], _Row],
+    found: Mapping[tuple[str, ...], _Outcomes],
     designs: int,
     ranges: Sequence[Sequence[tuple[int, str]]],
 ) -> dict[Any, list[tuple[str, ...]]]:
@@ -280,13 +280,14 @@ def _needed(policy: Policy, function: str) -> tuple[Any, list[str]]:
     return cases, kept
 
 
+_Label = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 #: An outcome for each place of the measured attributes.
-_Row = dict[tuple[int, ...], str]
+_Outcomes = dict[tuple[int, ...], str]
 
 
-def _outcomes(cases: Any, kept: list[str], down: int) -> dict[tuple[str, ...], _Row]:
+def _outcomes(cases: Any, kept: list[str], down: int) -> dict[tuple[str, ...], _Outcomes]:
     """What happens by the dimensions that go down, and below them by the places of measured values."""
-    found: dict[tuple[str, ...], _Row] = {}
+    found: dict[tuple[str, ...], _Outcomes] = {}
     for at, outcomes in cases.groupby(kept, sort=False)["outcome"]:
         different = list(dict.fromkeys(outcomes))
         text = different[0]
@@ -296,13 +297,13 @@ def _outcomes(cases: Any, kept: list[str], down: int) -> dict[tuple[str, ...], _
     return found
 
 
-def _ranges(number: int, policy: Policy, rows: Iterable[_Row]) -> list[tuple[int, str]]:
+def _ranges(number: int, policy: Policy, rows: Iterable[_Outcomes]) -> list[tuple[int, str]]:
     """The first place of each range of an attribute in which all outcomes are equal, with words."""
     scale = policy.space.scale
     return [(first, scale.text(first, last)) for first, last in _spans(number, len(scale), rows)]
 
 
-def _spans(number: int, places: int, rows: Iterable[_Row]) -> list[tuple[int, int]]:
+def _spans(number: int, places: int, rows: Iterable[_Outcomes]) -> list[tuple[int, int]]:
     """First and last place of each range of an attribute, given by its number, in which all
     outcomes are equal.
     """

@@ -18,6 +18,7 @@ from lxml import etree
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from suave_des.errors import InputError, KnowledgeError, shown, unknown
+from suave_des.files import Json
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.scale import TestedRegion, measurements_in, parse_region
@@ -164,7 +165,7 @@ def shipped_tests() -> tuple[Path, ...]:
     return tuple(sorted((shipped_folder("ontology") / "tests").glob("*.yaml")))
 
 
-def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str, Any]:
+def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> Json:
     """What a test is about in terms of a knowledge base."""
     base, reader = knowledge.base, FactReader(knowledge.base)
     reader.declare(test.given.facts)
@@ -391,7 +392,7 @@ def tests_text(
     Raises:
         KnowledgeError: the reasoner takes too long.
     """
-    content: dict[str, Any] = {
+    content: dict[str, object] = {
         key: value if isinstance(value, str) else list(map(str, value))
         for key, value in about.items()
         if value
@@ -410,7 +411,7 @@ def tests_text(
     return f"# {comment}\n{text}"
 
 
-def _given(state: KnowledgeState) -> dict[str, Any]:
+def _given(state: KnowledgeState) -> Json:
     given = {kind: content for kind, content in state_dict(state).items() if content}
     for name, value in state.measurements:  # numbers as numbers, where that is exact
         if Decimal(repr(float(value))) == value:
@@ -418,7 +419,7 @@ def _given(state: KnowledgeState) -> dict[str, Any]:
     return given
 
 
-def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
+def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, object]:
     if outcome.reasoning is None:
         return {"contradiction": True}
     follows = {"follows": sorted(map(str, outcome.inferred))} if outcome.inferred else {}

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would
 # take ten minutes.
-LARGEST = 400_000
+MOST_STATES = 400_000
 _T = TypeVar("_T")
 
 #: (component, c_status) of those that report.
@@ -180,7 +180,7 @@ class States:
         scale, attributes = space.scale, space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
         # else so many already that it does not matter how many values a range has
-        if total <= LARGEST:
+        if total <= MOST_STATES:
             measured = tuple(
                 tuple(
                     (name, each)
@@ -191,8 +191,8 @@ class States:
                 for values in scale.values(places)
             )
             total = len(measured) * len(reports) * len(tasks)
-        if total > LARGEST:
-            remedy = f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes"
+        if total > MOST_STATES:
+            remedy = f"at most {MOST_STATES:,}; lower --max-failed, or give a scenario with fewer measured attributes"
             raise InputError(
                 f"the policy has {total:,} kinds of states, which is too many", remedy=remedy
             )

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, nearest, shown, unknown
-from suave_des.files import check_folder
+from suave_des.files import Json, check_folder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
@@ -308,7 +308,7 @@ class StateBuilder:
         if kind == "objectives":
             KnowledgeState.of([ObjectiveState(name, value)])
         else:
-            part: dict[str, Any] = {kind: {name: value}}
+            part: Json = {kind: {name: value}}
             KnowledgeState.of(**part)
         if isinstance(value, str) and kind in _STATUSES:
             self._check_status(_STATUSES[kind], value)
@@ -442,7 +442,7 @@ def _check_number(name: str, value: object) -> None:
         raise InputError(f"{name}: {shown(value)} is not a number", remedy=remedy)
 
 
-def state_dict(state: KnowledgeState) -> dict[str, Any]:
+def state_dict(state: KnowledgeState) -> Json:
     """The content of a YAML or JSON file for a state; numbers are text, so that they stay exact."""
     return {
         "objectives": {each.function: each.status for each in state.objectives},

@@ -38,7 +38,7 @@ from suave_des.knowledge.rdf import (
     without_log,
 )
 
-MAX_BYTES = 64 * 2**20
+ONTOLOGY_LIMIT_BYTES = 64 * 2**20
 _BASE = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS = "an OWL ontology in RDF/XML or Turtle is expected, as Protégé saves it"
 TURTLE_ENDINGS = (".ttl", ".nt")
@@ -174,7 +174,7 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         KnowledgeError: empty, not XML, not OWL in RDF/XML, or with external entities or entities
             that expand too far; with the line where it is known.
     """
-    return _parsed(path, read_bytes(path, MAX_BYTES) if content is None else content)
+    return _parsed(path, read_bytes(path, ONTOLOGY_LIMIT_BYTES) if content is None else content)
 
 
 @lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it

@@ -29,7 +29,7 @@ from lxml import etree
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import read_bytes
 from suave_des.knowledge.ontology_file import (
-    MAX_BYTES,
+    ONTOLOGY_LIMIT_BYTES,
     RELATIVE_TO,
     TURTLE_ENDINGS,
     OntologyFile,
@@ -253,7 +253,7 @@ def _beside(file: OntologyFile) -> Iterator[Path]:
 def _may_have_iri(path: Path, iri: str) -> bool:
     """Return whether a file has the text of an IRI, and can be read as an ontology."""
     try:
-        if _comparable(iri).encode() not in read_bytes(path, MAX_BYTES):
+        if _comparable(iri).encode() not in read_bytes(path, ONTOLOGY_LIMIT_BYTES):
             return False
         read_ontology(path)
     except InputError:  # a file that happens to lie there is nobody's input
@@ -287,7 +287,7 @@ def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
         return None
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
     try:
-        root = etree.fromstring(read_bytes(catalog, MAX_BYTES), parser)
+        root = etree.fromstring(read_bytes(catalog, ONTOLOGY_LIMIT_BYTES), parser)
     except etree.XMLSyntaxError as error:
         raise KnowledgeError(
             f"not well-formed XML: {error.msg}", file=catalog, remedy="remove it, or correct it"

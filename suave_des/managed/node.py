@@ -59,7 +59,15 @@ class FunctionNode:
 
 @dataclass(eq=False)
 class ProcessNode(FunctionNode):
-    """A function whose activity is a process, from each activation to the deactivation."""
+    """A function whose activity is a process, from each activation to the deactivation.
+
+    Example:
+        class Beacon(CustomFunction, ProcessNode):
+            def activity(self):
+                while True:
+                    self.context.log("beacon", f"at {self.context.position()[2]:.1f} m")
+                    yield self.env.timeout(10.0)
+    """
 
     _process: simpy.Process | None = field(default=None, init=False)
 
@@ -144,6 +152,12 @@ class FunctionContext:
         bus: where diagnostics are published, and can be subscribed to.
         stream: makes a named random stream of this run.
         log: adds an event and its detail to the mission's record.
+
+    Example:
+        class Beacon(CustomFunction):
+            def __init__(self, context: FunctionContext) -> None:
+                super().__init__(context)
+                self.first_s = context.stream("first").uniform(0.0, 10.0)
     """
 
     name: str

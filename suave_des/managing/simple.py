@@ -43,6 +43,14 @@ def _default_modes(scenario: Scenario, functions: Iterable[str]) -> Iterator[tup
 class NoManager(ManagingSubsystem):
     """none: each function gets its fixed default mode when its task begins, or the mission if the
     whole of it needs the function; it never adapts.
+
+    Example:
+        class Recovers(NoManager):
+            subscribes_to = (Kind.COMPONENT_STATUS,)
+
+            def diagnostic(self, diagnostic):
+                if diagnostic.value == FAILED:
+                    self.system.change_mode("f_maintain_motion", "fd_recover_thrusters")
     """
 
     def mission_started(self) -> None:

@@ -93,7 +93,13 @@ class KnowledgeRecord:
 
 @dataclass(frozen=True)
 class MissionResult:
-    """A mission's metrics, with the record of how it went if that was asked for."""
+    """A mission's metrics, with the record of how it went if that was asked for.
+
+    Example:
+        simulator = Simulator(load_scenario("seams2023"))
+        result = simulator.run("metacontrol", run=1, seed=8, record=True)
+        print(result.metrics.search_time_s, len(result.events))
+    """
 
     metrics: MissionMetrics
     events: tuple[Event, ...] = ()

@@ -13,7 +13,12 @@ if TYPE_CHECKING:  # or looking a manager up would load the compiler
 
 
 class Kind(StrEnum):
-    """The kinds of diagnostics; the values are the exemplar's message texts."""
+    """The kinds of diagnostics; the values are the exemplar's message texts.
+
+    Example:
+        class Listener(NoManager):
+            subscribes_to = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
+    """
 
     QA_STATUS = "QA status"
     COMPONENT_STATUS = "Component status"

@@ -14,7 +14,6 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
 
 from suave_des.files import DERIVED, write_beside, write_file
 
@@ -25,7 +24,7 @@ def asset(name: str) -> str:
     return files("suave_des.pages").joinpath("assets", name).read_text(encoding="utf-8")
 
 
-def data_text(content: Any) -> str:
+def data_text(content: object) -> str:
     """Write plain data as JSON that may stand inside a script element: nothing in it can end the
     element.
     """
@@ -41,7 +40,7 @@ def compressed(text: str) -> str:
 def page(
     name: str,
     title: str,
-    content: Any,
+    content: object,
     styles: Sequence[str],
     scripts: Sequence[str],
     **blocks: str,

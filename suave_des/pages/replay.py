@@ -143,7 +143,7 @@ def replay_page(missions: Sequence[MissionRecord]) -> str:
     return page("replay.html", f"Replay: {title}", content, STYLES, SCRIPTS)
 
 
-def mission_on_page(mission: MissionRecord) -> dict[str, Any]:
+def mission_on_page(mission: MissionRecord) -> Plain:
     """Return a mission as the page plays it; times in s, lengths in m.
 
     Returns:

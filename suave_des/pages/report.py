@@ -36,8 +36,8 @@ from suave_des.results.mission import Adaptation, adaptations
 from suave_des.results.style import looks
 from suave_des.tables import capital
 
-LIMIT_BYTES: Final = 5_000_000
-PATHS: Final = 12
+PAGE_LIMIT_BYTES: Final = 5_000_000
+MOST_PATHS: Final = 12
 """Runs of each manager whose way is in a page."""
 _MOST_WAYS: Final = 120
 _STYLES: Final = ("common.css", "report.css")
@@ -57,7 +57,7 @@ _CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
 
 def report_page(
     folders: Sequence[Path],
-    runs: int = PATHS,
+    runs: int = MOST_PATHS,
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Make the report of campaigns, or of other results that `compare` reads.
@@ -84,8 +84,8 @@ def report_page(
     }
     text = page("report.html", f"Report: {title}", content, _STYLES, _SCRIPTS, library=library)
     size = len(text.encode(errors="backslashreplace"))  # as it is written
-    if size > LIMIT_BYTES:
-        problem = f"the page would have {size / 1e6:.1f} MB, more than {LIMIT_BYTES / 1e6:g}"
+    if size > PAGE_LIMIT_BYTES:
+        problem = f"the page would have {size / 1e6:.1f} MB, more than {PAGE_LIMIT_BYTES / 1e6:g}"
         raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
     return text
 
@@ -108,7 +108,7 @@ def plotly_script() -> str:
         ) from None
 
 
-def _results(missions: Missions) -> dict[str, Any]:
+def _results(missions: Missions) -> dict[str, object]:
     """Compare missions, and prepare what follows for the page."""
     found = compare_groups(grouped(missions))
     return {
@@ -128,7 +128,7 @@ def _results(missions: Missions) -> dict[str, Any]:
     }
 
 
-def chart_columns(missions: Missions) -> dict[str, Any]:
+def chart_columns(missions: Missions) -> dict[str, object]:
     """Put missions into columns for the page's charts, at most MOST_DRAWN of them.
 
     Returns:
@@ -182,7 +182,7 @@ def _short(value: float) -> float | None:
     return int(value) if value.is_integer() else value
 
 
-def _made(folder: Path) -> dict[str, Any]:
+def _made(folder: Path) -> dict[str, object]:
     """Read how the campaign in a folder was made; little is known of other folders."""
     about = read_manifest(folder)
     path = folder / MANIFEST_FILE
@@ -197,11 +197,11 @@ def _made(folder: Path) -> dict[str, Any]:
     }
 
 
-def _texts(values: Mapping[str, Any]) -> dict[str, str]:
+def _texts(values: Mapping[str, object]) -> dict[str, str]:
     return {name: _text(value) for name, value in values.items()}
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Write a value of a manifest for readers: lists and mappings without their brackets."""
     if isinstance(value, dict):
         return "; ".join(f"{name}: {_text(part)}" for name, part in value.items()) or "none"
@@ -213,7 +213,7 @@ def _text(value: Any) -> str:
 # Ways
 
 
-def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, Any]:
+def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, object]:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest,
     median and slowest.
 
@@ -222,7 +222,7 @@ def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, A
     with the times at which they changed.
     """
     frame = missions.frame
-    ways: dict[str, Any] = {"pipeline": [], "paths": [], "note": ""}
+    ways: dict[str, object] = {"pipeline": [], "paths": [], "note": ""}
     if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
         return ways | {
             "note": "Paths and timelines are in the report of one campaign's folder only"
@@ -251,7 +251,7 @@ def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, A
 
 def _paths(
     opened: MissionRunner, missions: Missions, groups: Sequence[str], runs: int
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[dict[str, object]]:
     frame = missions.frame
     known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
     is_swept = opened.campaign.variation.sweep.points > 1
@@ -281,7 +281,7 @@ def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: i
     return sorted(list(chosen)[:runs])
 
 
-def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, Any]:
+def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, object]:
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]

@@ -24,7 +24,7 @@ from suave_des.records.metrics import FOUND, PAPER_METRICS, Metric
 from suave_des.records.missions import Missions
 from suave_des.records.runs import CONDITION, check_one_mission
 from suave_des.results import statistics
-from suave_des.results.comparison import Row, estimate_in
+from suave_des.results.comparison import estimate_in
 from suave_des.results.conclusions import difference_claim
 from suave_des.results.groups import (
     Group,
@@ -36,7 +36,7 @@ from suave_des.results.groups import (
 )
 from suave_des.results.horizon import at_horizons, to_horizon
 from suave_des.results.statistics import Sample
-from suave_des.tables import Section, Table, Written, capital, rows_of
+from suave_des.tables import Section, Table, TableRow, Written, capital, rows_of
 
 LEAST_CONDITIONS = 3
 LEAST_TO_WEIGH = 10
@@ -325,7 +325,7 @@ def _estimate(
     conditions: pandas.DataFrame,
     draws: pandas.DataFrame,
     shared: pandas.DataFrame,
-) -> dict[str, Any]:
+) -> TableRow:
     """Estimate the mean of one manager, or the difference of two, over the conditions that both
     have.
 
@@ -354,7 +354,7 @@ def _estimate(
         varies = (drawn["draw"].var() - by_chance).clip(lower=0.0) ** 0.5
         spread = max(*varies, *own["real"].std()) if len(both) > 1 else None
         assisted, weight = assisted_mean(real, same, population, chance, spread)
-    row: dict[str, Any] = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name}
+    row: TableRow = {"group": both[0], "other": "".join(both[1:]), "metric": metric.name}
     row |= {"runs": int(own["real_n"].sum().sum()), "conditions": len(own)}
     row |= alone.columns("alone") | assisted.columns("assisted") | {"weight": weight}
     row["narrower"] = (alone.high - alone.low) / (assisted.high - assisted.low)
@@ -419,11 +419,11 @@ def _worth(real: Sample, assisted: Estimate) -> dict[str, int | None]:
 # Words
 
 
-def _name(row: Row) -> str:
+def _name(row: TableRow) -> str:
     return f"{row['group']} - {row['other']}" if row["other"] else str(row["group"])
 
 
-def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
+def _cells(row: TableRow, metric: Metric) -> tuple[str, ...]:
     alone, assisted = (estimate_in(row, name) for name in ("alone", "assisted"))
     if row["other"]:
         value = metric.difference
@@ -442,7 +442,7 @@ def _cells(row: Row, metric: Metric) -> tuple[str, ...]:
     )
 
 
-def assisted_conclusion(row: Row, metric: Metric) -> str:
+def assisted_conclusion(row: TableRow, metric: Metric) -> str:
     """Write what an estimate shows, and whether the simulation helped."""
     found = estimate_in(row, "assisted")
     if row["other"] and found.has_interval and not found.contains(0.0):
@@ -461,7 +461,7 @@ def assisted_conclusion(row: Row, metric: Metric) -> str:
     return f"{claim}; {_help(row, metric)}."
 
 
-def _help(row: Row, metric: Metric) -> str:
+def _help(row: TableRow, metric: Metric) -> str:
     if metric.name == FOUND:
         return "simulated missions do not assist shares"
     if row["weight"] == 0.0:

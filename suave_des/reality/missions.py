@@ -28,8 +28,8 @@ from suave_des.campaign.variation import Sweep, cell_of, check_drawn, vary
 from suave_des.errors import InputError, line_error, located, number_of
 from suave_des.records.metrics import FOUND, SEARCH_TIME, metric_of
 from suave_des.records.runs import (
-    COLUMNS,
     CONDITION,
+    FRAME_COLUMNS,
     NUMBER_COLUMNS,
     TIME_LIMIT,
     Runs,
@@ -130,7 +130,7 @@ class Targets(Strict):
 
 def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
     """Count the missions in a share, and those that it is a share of; runs have the columns of
-    records.runs.COLUMNS.
+    records.runs.FRAME_COLUMNS.
     """
     own = runs[runs["manager"] == share.manager]
     if share.of == "detections":
@@ -535,7 +535,7 @@ def _check_scenario(
         if name not in population:
             problem = f"it does not draw {name}, in which the real conditions differ"
             raise InputError(problem, remedy=_DRAW)
-    known = {*COLUMNS, *same, *_OF_CAMPAIGNS}
+    known = {*FRAME_COLUMNS, *same, *_OF_CAMPAIGNS}
     for name in map(str, population):
         if name not in known and metric_of(name) is None and population[name].nunique() > 1:
             problem = (

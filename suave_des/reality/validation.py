@@ -47,9 +47,8 @@ from suave_des.records.missions import in_papers_order
 from suave_des.records.runs import CONDITION, read_runs
 from suave_des.resources import find
 from suave_des.results import statistics
-from suave_des.results.comparison import Row
 from suave_des.results.statistics import SIGNIFICANCE, Sample
-from suave_des.tables import Table, markdown_text, rows_of
+from suave_des.tables import Table, TableRow, markdown_text, rows_of
 
 COMPARED = (*PAPER_METRICS, REACTION_TIME)
 """Metrics that are compared where both sides have values."""
@@ -303,7 +302,7 @@ def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
     return runs.loc[runs["manager"] == manager, metric].dropna().to_numpy(dtype=float)
 
 
-def _described(name: str, sample: Sample) -> dict[str, Any]:
+def _described(name: str, sample: Sample) -> TableRow:
     """Describe a sample by columns that begin with a name: n, mean and std with their intervals,
     and median.
     """
@@ -318,7 +317,7 @@ def _described(name: str, sample: Sample) -> dict[str, Any]:
 
 def _cell(
     metric: str, manager: str, samples: Sequence[Sample], generators: _Generators
-) -> dict[str, Any]:
+) -> TableRow:
     """Compare the real and the simulated sample of a manager."""
     real, ours = samples
     from scipy.stats import ks_2samp  # with ties its p is too high
@@ -343,7 +342,7 @@ def _pair(
     other: tuple[str, str],
     samples: Sequence[Sequence[Sample]],
     generators: _Generators,
-) -> dict[str, Any]:
+) -> TableRow:
     """Compare two managers in a metric (metric, manager), each with its real and its simulated
     sample.
     """
@@ -357,7 +356,7 @@ def _pair(
     sign = statistics.sign_of(published["p_less"], published["p_greater"])
     sizes = len(real), len(other_real)
     rng = generators(f"subsamples/{first}/{second}/{metric}")
-    row: dict[str, Any] = {"first": first, "second": second, "metric": metric}
+    row: TableRow = {"first": first, "second": second, "metric": metric}
     # The exemplar's own one-sided tests: less time, or a greater distance, is better.
     if METRICS[metric].better < 0:
         row["published_superiority"] = 1.0 - published["effect"]
@@ -403,12 +402,10 @@ def compare_shares(
     return pandas.DataFrame(rows)
 
 
-def _share_row(
-    share: Share, published: tuple[int, int], simulated: tuple[int, int]
-) -> dict[str, Any]:
+def _share_row(share: Share, published: tuple[int, int], simulated: tuple[int, int]) -> TableRow:
     """Return the cells of a share, of which each side has so many missions of so many."""
     low, high = share.target or (math.nan, math.nan)
-    row: dict[str, Any] = {"manager": share.manager, "name": share.name}
+    row: TableRow = {"manager": share.manager, "name": share.name}
     for side, (number, n) in (("published", published), ("simulated", simulated)):
         columns = share_of(number, n, "exact").columns(f"{side}_share")
         row |= {f"{side}_count": number, f"{side}_n": n, **columns}
@@ -679,7 +676,7 @@ def _conditions_table(conditions: pandas.DataFrame, real: str) -> Table:
     )
 
 
-def _target(each: Row) -> tuple[str, ...]:
+def _target(each: TableRow) -> tuple[str, ...]:
     kind = each["kind"]
     if kind == "share":
         what = each["what"]
@@ -810,6 +807,10 @@ def _claim_of_distance(less_others: Sequence[float]) -> str:
 @plain_arguments
 def compare_with_paper(runs: pandas.DataFrame, published: Path | None = None) -> PaperComparison:
     """Compare the missions of a campaign with published figures.
+
+    Example:
+        runs = read_runs("simulated/runs.csv").frame
+        print(compare_with_paper(runs).table().text(95))
 
     Args:
         runs: with the columns of runs.csv.

@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from suave_des.errors import InputError
-from suave_des.files import read_json
+from suave_des.files import Json, read_json
 from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import problem_and_remedy
@@ -36,7 +36,7 @@ BoundedWhole = Annotated[int, Field(ge=-GREATEST, le=GREATEST)]
 BoundedCount = Annotated[int, Field(ge=0, le=GREATEST)]
 Cell = str | bool | BoundedWhole | BoundedNumber | None
 """Of a file of results."""
-FileName = InstanceOf[str]
+AnyText = InstanceOf[str]
 """Any text, as a name's bytes may be no UTF-8."""
 
 
@@ -83,7 +83,7 @@ FAILURE: TypeAdapter[tuple[str, int, float | None, str, bool, int]] = TypeAdapte
 )
 """What a campaign keeps of a mission that failed."""
 WRITTEN: TypeAdapter[dict[str, list[str]]] = TypeAdapter(
-    dict[FileName, list[str]], config=Recorded.model_config
+    dict[AnyText, list[str]], config=Recorded.model_config
 )
 """What a campaign keeps of the files that it wrote: SHA-256 by name."""
 
@@ -101,9 +101,9 @@ class MissionFile(Recorded):
 
     metrics: Metrics
     scenario: Scenario
-    inputs_sha256: dict[FileName, str] = {}
+    inputs_sha256: dict[AnyText, str] = {}
     search_altitudes_m: dict[str, BoundedNumber] = {}
-    files_sha256: dict[FileName, str] = {}
+    files_sha256: dict[AnyText, str] = {}
 
 
 # Knowledge
@@ -130,7 +130,7 @@ class Cycle(State):
 class ScenarioLine(Recorded):
     """The first line of knowledge_states.jsonl."""
 
-    scenario: dict[str, Any]
+    scenario: Json
 
 
 class StateOfTable(State):
@@ -148,7 +148,7 @@ class MissionLine(Recorded):
     manager: str
     point: BoundedCount
     run: BoundedCount
-    swept: dict[str, Any]
+    swept: Json
     states: list[StateOfTable]
     cycles: list[list[str | int | BoundedNumber]]
     measured_since: dict[str, dict[str, str]] = {}
@@ -197,7 +197,7 @@ class Manifest(Recorded):
     runs_per_draw: Annotated[int, Field(ge=1, le=GREATEST)] = 1
     campaign_sha256: str | None = None
     labels: dict[str, str] = {}
-    command: list[FileName] = []
+    command: list[AnyText] = []
 
 
 # Reading

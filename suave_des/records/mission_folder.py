@@ -382,7 +382,7 @@ def read_missions(path: Path) -> Iterator[RecordedKnowledge]:
     Raises:
         InputError: it cannot be read, or a line of it is damaged.
     """
-    scenario: dict[str, Any] | None = None
+    scenario: dict[str, object] | None = None
     for line in _lines(path, "campaign"):
         with line.located():
             if scenario is None:
@@ -392,7 +392,7 @@ def read_missions(path: Path) -> Iterator[RecordedKnowledge]:
         yield mission
 
 
-def _mission(recorded: contents.MissionLine, scenario: Mapping[str, Any]) -> RecordedKnowledge:
+def _mission(recorded: contents.MissionLine, scenario: Mapping[str, object]) -> RecordedKnowledge:
     at_point = deepcopy(dict(scenario))
     for key_path, value in recorded.swept.items():
         holder, key = holder_of(at_point, key_path)

@@ -17,9 +17,9 @@ from suave_des.files import read_csv, real
 from suave_des.records.contents import Manifest, MissionCounts
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME, metric_of
 from suave_des.records.runs import (
-    COLUMNS,
+    CSV_LIMIT_BYTES,
+    FRAME_COLUMNS,
     REMEDY,
-    SIZE_LIMIT_BYTES,
     TIME_LIMIT,
     CsvContent,
     check_one_mission,
@@ -41,8 +41,8 @@ class Missions:
     """Missions to compare, a row for each.
 
     Attributes:
-        frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep
-            varies; with `runs_sharing_draw` where that is known.
+        frame: with `source`, the columns of records.runs.FRAME_COLUMNS, further metrics, and what a
+            sweep varies; with `runs_sharing_draw` where that is known.
         notes: what readers of the comparison should know about the files.
         folders: of the campaigns that can be run again, by source.
         labels: of managers that are shown under another name than their own, by that.
@@ -146,7 +146,7 @@ def _read_file(file: Path, *, is_of_folder: bool = False) -> Missions:
     """Read a file; `is_of_folder`: it stands for its folder, a campaign's."""
     folder = file.parent
     manifest = read_manifest(folder) if (folder / RUNS_FILE).exists() else Manifest()
-    read = _checked(file, read_csv(file, SIZE_LIMIT_BYTES, REMEDY), manifest)
+    read = _checked(file, read_csv(file, CSV_LIMIT_BYTES, REMEDY), manifest)
     is_ours = _is_simulated(read.frame)
     frame = read.frame if is_ours else in_papers_order(read.frame)
     notes = read.notes
@@ -164,7 +164,7 @@ def _read_exemplars(folder: Path) -> Missions:
     left out.
     """
     files = _csv_files(folder)
-    contents = {file: read_csv(file, SIZE_LIMIT_BYTES, REMEDY) for file in files}
+    contents = {file: read_csv(file, CSV_LIMIT_BYTES, REMEDY) for file in files}
     own = [file for file in files if not is_foreign(contents[file])] or files[:1]
     read = [_checked(file, contents[file], Manifest()) for file in own]
     frame = pandas.concat([each.frame for each in read], ignore_index=True)
@@ -247,7 +247,9 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
 def _as_read(frame: pandas.DataFrame) -> pandas.DataFrame:
     """Give a frame the columns and types that one has which was read from a file."""
     texts = ("scenario", "manager", "seed")
-    missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in frame}
+    missing = {
+        name: "" if name in texts else math.nan for name in FRAME_COLUMNS if name not in frame
+    }
     frame = frame.assign(**missing, source="")
     frame = frame.astype(dict.fromkeys(texts, str))
     metrics = [str(name) for name in frame if metric_of(str(name)) is not None]
@@ -302,7 +304,7 @@ def _swept(manifest: Manifest, frame: pandas.DataFrame) -> tuple[str, ...]:
 
     These differ between missions of one manager, seed and run, and are no metrics.
     """
-    columns = [name for name in _no_metrics(frame) if name not in (*COLUMNS, TIME_LIMIT)]
+    columns = [name for name in _no_metrics(frame) if name not in (*FRAME_COLUMNS, TIME_LIMIT)]
     if manifest.missions is not None:
         return tuple(name for name in manifest.sweep.names if name in columns)
     if not columns or frame["run"].isna().any():

@@ -32,7 +32,7 @@ from suave_des.records.metrics import (
     metric_of,
 )
 
-COLUMNS = (
+FRAME_COLUMNS = (
     "scenario",
     "manager",
     SEARCH_TIME,
@@ -62,7 +62,7 @@ _POSITION = "initial pos (x,y)"
 _START = ("initial_x_m", "initial_y_m")
 _PLACE = r"^\(\s*([-+.0-9e]+)\s*,\s*([-+.0-9e]+)\s*\)$"
 """How the exemplar writes where a mission began: (-17.0, 2.57)."""
-SIZE_LIMIT_BYTES = 500_000_000
+CSV_LIMIT_BYTES = 500_000_000
 """Of a file of results."""
 _GREATEST = 1e12
 """Of numbers, as in scenarios."""
@@ -115,7 +115,7 @@ _LAYOUT_1_5: _Layout = {
     "mean reaction time (s)": (REACTION_TIME, lambda of: of[REACTION_TIME] or 0.0),
     _RUN_INDEX: ("", lambda of: of["run"]),
 }
-_OWN = {name: name for name in (*COLUMNS, TIME_LIMIT)}
+_OWN = {name: name for name in (*FRAME_COLUMNS, TIME_LIMIT)}
 _LAYOUTS: tuple[Mapping[str, str], ...] = (
     _OWN,
     *(
@@ -137,9 +137,9 @@ class Runs:
 
     Attributes:
         files: SHA-256 of each file's bytes, in hex, by its path.
-        frame: a row for each mission with COLUMNS and the further columns of the files; of one
-            file, indexed by its line; of several real ones, with `condition` if the conditions are
-            known.
+        frame: a row for each mission with FRAME_COLUMNS and the further columns of the files; of
+            one file, indexed by its line; of several real ones, with `condition` if the conditions
+            are known.
         notes: what a reader of a comparison should know about the files.
     """
 
@@ -200,6 +200,10 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
     averages, blank rows and the header where it is repeated are left out. A column run_idx of the
     exemplar's pairs missions of one name, as a run's number and seed do those of a campaign.
 
+    Example:
+        missions = read_runs("simulated/runs.csv").frame
+        missions.groupby("manager")["search_time_s"].mean()
+
     Args:
         path: of the file; columns that are no metrics are numbers where all their values are, and
             else text.
@@ -210,7 +214,7 @@ def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
             an impossible value.
     """
     path = Path(path)
-    return runs_in(path, read_csv(path, SIZE_LIMIT_BYTES, REMEDY), needed)
+    return runs_in(path, read_csv(path, CSV_LIMIT_BYTES, REMEDY), needed)
 
 
 def runs_in(path: Path, content: CsvContent, needed: Sequence[str] = ()) -> Runs:
@@ -276,8 +280,8 @@ class _Cells:
         self.names = {name: column for column, name in ours.items()}
 
     def missions(self) -> pandas.DataFrame:
-        """Check and convert the cells; a frame with COLUMNS and the further ones. Errors name the
-        line.
+        """Check and convert the cells; a frame with FRAME_COLUMNS and the further ones. Errors name
+        the line.
         """
         names = self.text["manager"]
         self._check("manager", names != "", "a manager's name")
@@ -285,7 +289,10 @@ class _Cells:
             self._split_names([str(name) for name in names.unique()])
         limit_s = self._numbers(TIME_LIMIT, least=0.0) if TIME_LIMIT in self.text else None
         search_time_s = self._search_times_s(limit_s)
-        values: dict[str, Any] = dict.fromkeys(COLUMNS, math.nan) | {"scenario": "", "seed": ""}
+        values: dict[str, Any] = dict.fromkeys(FRAME_COLUMNS, math.nan) | {
+            "scenario": "",
+            "seed": "",
+        }
         values |= {
             name: self._converted(name) for name in map(str, self.text) if name not in ("", FOUND)
         }

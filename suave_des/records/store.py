@@ -46,7 +46,7 @@ from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE
 STORE_FILE = "campaign.sqlite"
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
 ENSEMBLE_FILE = "ensemble.csv"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+CAMPAIGN_FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 _WRITTEN = "written"
 """What is noted of the files beside it."""
 SUAVE_FOLDER = "suave"
@@ -303,7 +303,9 @@ class Store:
             InputError: the store is damaged.
         """
 
-        def checked(records: Iterable[Any]) -> Iterator[MissionOutcome]:
+        def checked(
+            records: Iterable[tuple[int, int, int, int, str, int]],
+        ) -> Iterator[MissionOutcome]:
             for record in records:
                 outcome = _outcome(record, self.path)
                 if problem := problem_of(outcome):
@@ -524,8 +526,8 @@ def write_campaign(
     files: Mapping[str, FileContent],
     suave: Mapping[str, FileContent],
 ) -> None:
-    """Write a campaign's manifest, which lists all others, and its files, of those in FILES, into
-    the folder of its store, replacing those of an earlier use.
+    """Write a campaign's manifest, which lists all others, and its files, of those in
+    CAMPAIGN_FILES, into the folder of its store, replacing those of an earlier use.
 
     The exemplar's own files, `suave`, have a folder to themselves: scripts that take all files of a
     folder, or compare one file with the others, find what they expect.
@@ -617,7 +619,7 @@ def tidy(store: Store, *, is_new: bool) -> None:
     own = own_files(folder, MANIFEST_FILE, noted) if is_new else {}
     if own:
         own[MANIFEST_FILE] = ""
-    remove_results(folder, {*FILES, *noted}, own)
+    remove_results(folder, {*CAMPAIGN_FILES, *noted}, own)
     _leave_empty(folder, own)
 
 

@@ -31,7 +31,7 @@ from suave_des.results.comparison import Comparison, concluded
 from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
 from suave_des.results.statistics import Sample
-from suave_des.tables import Table
+from suave_des.tables import Table, TableRow
 
 
 class Choices(TypedDict, total=False):
@@ -59,6 +59,10 @@ class Choices(TypedDict, total=False):
 @plain_arguments
 def compare_folders(paths: Sequence[str | Path], **choices: Unpack[Choices]) -> Comparison:
     """Compare the missions in folders or files of results.
+
+    Example:
+        found = compare_folders(["simulated"], metrics=["search_time_s"], against="none")
+        print(found.conclusion)
 
     Args:
         paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV
@@ -113,7 +117,7 @@ def compare_groups(
     return concluded(groups, summaries, found, *largest)
 
 
-def _correct(rows: Sequence[dict[str, Any]], column: str) -> None:
+def _correct(rows: Sequence[TableRow], column: str) -> None:
     """Add Holm's correction of the p in a column for all tests together."""
     tested = [row for row in rows if row.get(column) is not None]
     ps = statistics.holm([row[column] for row in tested])
@@ -158,13 +162,13 @@ def _pairs_against(groups: Sequence[Group], against: str) -> list[tuple[Group, G
     return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
 
 
-def _summary(group: Group, metric: Metric) -> dict[str, Any]:
+def _summary(group: Group, metric: Metric) -> TableRow:
     """Estimate one metric of one group; the restricted mean of search times reaches to the
     horizon.
     """
     rows = group.frame[group.frame[metric.name].notna()]
     sample = rows[metric.name].to_numpy(float)
-    row: dict[str, Any] = {"group": group.name, "metric": metric.name}
+    row: TableRow = {"group": group.name, "metric": metric.name}
     row |= {"n": len(sample), "missing": len(group.frame) - len(sample)}
     if not len(sample) or np.isinf(sample).any():
         return row
@@ -187,9 +191,7 @@ def _mean(group: Group, metric: Metric, sample: Sample) -> Estimate:
     return statistics.mean_interval(sample).cut(0.0, 1.0)
 
 
-def _until_found(
-    times_s: Sample, was_found: NDArray[np.float64], horizon_s: float
-) -> dict[str, Any]:
+def _until_found(times_s: Sample, was_found: NDArray[np.float64], horizon_s: float) -> TableRow:
     """Estimate times until the pipeline is found, where it is known which missions found it."""
     if np.isnan(was_found).any():
         return {}
@@ -203,12 +205,12 @@ def _difference(
     metric: Metric,
     samples: _Samples,
     half_width: float | None,
-) -> dict[str, Any]:
+) -> TableRow:
     """Estimate the difference of two groups in one metric, and test it; half_width None: as usual
     for the metric.
     """
     is_paired, why, x, y = samples
-    row: dict[str, Any] = {"group": first.name, "other": second.name, "metric": metric.name}
+    row: TableRow = {"group": first.name, "other": second.name, "metric": metric.name}
     row |= {"paired": is_paired, "why": why, "n": len(x), "n_other": len(y), "test": None}
     if not len(x) or not len(y):
         return row
@@ -246,12 +248,12 @@ def _shares_compared(
     return statistics.shares_test(*counts) | {"difference": difference}
 
 
-def _values_compared(x: Sample, y: Sample, *, is_paired: bool) -> dict[str, Any]:
+def _values_compared(x: Sample, y: Sample, *, is_paired: bool) -> TableRow:
     """Compare means, ranks, and in how many pairs the one or the other has more.
 
     Infinite values are later than all others by ranks, and have no mean.
     """
-    row: dict[str, Any] = {"difference": Estimate(), "mean_test": None, "mean_p": None}
+    row: TableRow = {"difference": Estimate(), "mean_test": None, "mean_p": None}
     if np.isfinite(x).all() and np.isfinite(y).all():
         name, p = statistics.means_test(x, y, is_paired=is_paired)
         row |= {"mean_test": name, "mean_p": known(p)}
@@ -266,7 +268,7 @@ def _values_compared(x: Sample, y: Sample, *, is_paired: bool) -> dict[str, Any]
     return row | test(x, y) | {"share_greater": greater, "share_less": less}
 
 
-def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) -> dict[str, Any]:
+def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) -> TableRow:
     """Return the number of runs that an interval needs, and the gain from pairing; equal values do
     not tell them.
     """

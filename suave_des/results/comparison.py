@@ -8,7 +8,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import pandas
 
@@ -18,9 +17,8 @@ from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.conclusions import conclusion, overall_conclusion
 from suave_des.results.groups import Groups, listed
 from suave_des.results.statistics import A12, RANK_BISERIAL
-from suave_des.tables import EFFECT, LATEX_NEEDS, Section, Table, Written, capital
+from suave_des.tables import EFFECT, LATEX_NEEDS, Section, Table, TableRow, Written, capital
 
-Row = Mapping[str, Any]
 """A row of a frame by column, None where there is nothing."""
 _NO_TABLE = Table((), ())
 _EFFECTS = {
@@ -52,7 +50,7 @@ _DIFFERENCE = (
 """Columns of the frames, in order."""
 
 
-def estimate_in(row: Row, name: str) -> Estimate:
+def estimate_in(row: TableRow, name: str) -> Estimate:
     """Return an estimate from the three columns that have it, as of Estimate.columns."""
     value, low, high = (
         math.nan if row[each] is None else row[each] for each in (name, *interval_names(name))
@@ -102,8 +100,8 @@ class Comparison(Written):
 
     conclusion: str
     notes: tuple[str, ...]
-    of_groups: Sequence[Row] = field(repr=False)
-    of_pairs: Sequence[Row] = field(repr=False)
+    of_groups: Sequence[TableRow] = field(repr=False)
+    of_pairs: Sequence[TableRow] = field(repr=False)
     metrics: tuple[Metric, ...] = field(repr=False)
     counted: str = field(default="mission", repr=False)
     largest: Table = field(default=_NO_TABLE, repr=False)
@@ -190,7 +188,7 @@ class Comparison(Written):
         """
         return any(each["point"] for each in self.of_pairs)
 
-    def _by_point(self, rows: Sequence[Row], metric: Metric) -> list[Row]:
+    def _by_point(self, rows: Sequence[TableRow], metric: Metric) -> list[TableRow]:
         """Return the rows of a metric, those of a point of a sweep together."""
         points = dict.fromkeys(each["point"] for each in (*self.of_groups, *self.of_pairs))
         own = _of_metric(rows, metric)
@@ -254,7 +252,7 @@ class Comparison(Written):
             return f"{low} to {number_of(high, self.counted)} for each manager{where}."
         return "; ".join(f"{name}: {number_of(n, self.counted)}" for name, n in sizes.items()) + "."
 
-    def _content(self) -> dict[str, Any]:
+    def _content(self) -> TableRow:
         return {
             **super()._content(),
             "largest_differences": {"rows": self.largest.rows, "replay": self.replay},
@@ -267,7 +265,7 @@ def _latex_differences(rows: Sequence[tuple[str, ...]], title: str, label: str, 
     return text.replace("p (Holm)", "$p$ (Holm)")
 
 
-def _of_metric(rows: Sequence[Row], metric: Metric) -> list[Row]:
+def _of_metric(rows: Sequence[TableRow], metric: Metric) -> list[TableRow]:
     return [each for each in rows if each["metric"] == metric.name]
 
 
@@ -278,7 +276,7 @@ def _over_all(tests: int) -> str:
 # Tables
 
 
-def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
+def _summary_table(metric: Metric, summaries: Sequence[TableRow]) -> Table:
     """Return the estimates of each group; a share has neither spread nor quartiles."""
     headings = ("manager", "n", "mean", "95% interval", "std", "median", "quartiles")
     width = 4 if metric.name == FOUND else len(headings)
@@ -295,7 +293,7 @@ def _summary_table(metric: Metric, summaries: Sequence[Row]) -> Table:
     return Table(headings[:width], rows)
 
 
-def _search_table(summaries: Sequence[Row]) -> Table:
+def _search_table(summaries: Sequence[TableRow]) -> Table:
     """Return search times in which missions that never found the pipeline are censored; no rows for
     other metrics.
     """
@@ -326,14 +324,14 @@ def _seconds(value: float) -> str:
     return f"{value:.0f}" if math.isfinite(value) else "not reached"
 
 
-def _difference_table(metric: Metric, differences: Sequence[Row]) -> Table:
+def _difference_table(metric: Metric, differences: Sequence[TableRow]) -> Table:
     """Return the difference of each pair; for shares, without an effect size."""
     headings = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", EFFECT)
     width = 6 if metric.name == FOUND else len(headings)
     return Table(headings[:width], [_difference_row(each, metric)[:width] for each in differences])
 
 
-def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
+def _difference_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
     sizes = dict.fromkeys((each["n"], each["n_other"]))
     names = f"{each['group']} - {each['other']}", ", ".join(f"{n:,}" for n in sizes)
     if not each["test"]:
@@ -352,7 +350,7 @@ def _difference_row(each: Row, metric: Metric) -> tuple[str, ...]:
     )
 
 
-def _runs_row(each: Row, metric: Metric) -> tuple[str, ...]:
+def _runs_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
     ratio = "" if each["variance_ratio"] is None else f"{each['variance_ratio']:.1f}"
     paired = f"{each['runs_needed_paired']:,}" if each["runs_needed_paired"] else ""
     unpaired = (
@@ -378,8 +376,8 @@ def _p(p: float) -> str:
 
 def concluded(
     groups: Groups,
-    summaries: Sequence[Row],
-    differences: Sequence[dict[str, Any]],
+    summaries: Sequence[TableRow],
+    differences: Sequence[TableRow],
     largest: Table,
     replay: str,
 ) -> Comparison:
@@ -409,13 +407,13 @@ def concluded(
     )
 
 
-def _common_point(points: Mapping[str, str], row: Row) -> str:
+def _common_point(points: Mapping[str, str], row: TableRow) -> str:
     """Return the point of a sweep at which both groups of a pair are; empty if there is none."""
     point = points[row["group"]]
     return point if point == points[row["other"]] else ""
 
 
-def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
+def _frame(rows: Sequence[TableRow], columns: tuple[str, ...]) -> pandas.DataFrame:
     """Make a frame of rows, of each estimate its value, the ends of its interval, and how that is
     found.
     """
@@ -430,7 +428,7 @@ def _frame(rows: Sequence[Row], columns: tuple[str, ...]) -> pandas.DataFrame:
     return pandas.DataFrame(plain, columns=columns)
 
 
-def _means(summaries: Sequence[Row], metric: Metric) -> dict[str, float]:
+def _means(summaries: Sequence[TableRow], metric: Metric) -> dict[str, float]:
     """Return the mean of a metric of each group that has one."""
     return {
         each["group"]: each["mean"].value
@@ -440,7 +438,7 @@ def _means(summaries: Sequence[Row], metric: Metric) -> dict[str, float]:
 
 
 def _conclusions(
-    groups: Groups, summaries: Sequence[Row], differences: Sequence[Row]
+    groups: Groups, summaries: Sequence[TableRow], differences: Sequence[TableRow]
 ) -> Iterator[str]:
     """Yield the conclusion; of points of a sweep at which managers are compared, one for those that
     have the same.
@@ -487,7 +485,7 @@ def _lost(groups: Groups, names: Sequence[str]) -> str:
     return f"The pipeline was not found by {listed(lost)}, which {counts}. "
 
 
-def _worse_paired(differences: Sequence[Row]) -> Iterator[str]:
+def _worse_paired(differences: Sequence[TableRow]) -> Iterator[str]:
     """Yield a note on pairs whose differences vary more than those of independent runs would."""
     worse = [
         f"{each['group']} - {each['other']} in {each['metric']} ({1.0 / each['variance_ratio']:.1f} times)"

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from suave_des.errors import number_of
 from suave_des.estimates import Estimate, percent
@@ -21,8 +20,8 @@ from suave_des.results.statistics import (
     SIGNIFICANCE,
     WILCOXON,
 )
+from suave_des.tables import TableRow
 
-Row = Mapping[str, Any]
 """A difference with the columns of Comparison's frame, but whole estimates."""
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
 _MOST_SENTENCES = 3
@@ -30,7 +29,7 @@ _MOST_SENTENCES = 3
 _OPEN = "the interval, which is for this difference alone, excludes 0"
 
 
-def conclusion(found: Row, metric: Metric) -> str:
+def conclusion(found: TableRow, metric: Metric) -> str:
     """Write what one difference shows: a sentence each for means, ranks and pairs."""
     group = found["group"]
     other = found["other"]
@@ -75,7 +74,7 @@ def difference_claim(first: str, second: str, value: float, metric: Metric) -> s
 # One difference
 
 
-def _sentence_of_means(found: Row, metric: Metric) -> str:
+def _sentence_of_means(found: TableRow, metric: Metric) -> str:
     group = found["group"]
     other = found["other"]
     apart = found["difference"]
@@ -101,7 +100,7 @@ def _sentence_of_means(found: Row, metric: Metric) -> str:
     return f"No difference of {what} is shown between {group} and {other} ({signed}; {test})."
 
 
-def _sentence_of_ranks(found: Row, metric: Metric) -> str:
+def _sentence_of_ranks(found: TableRow, metric: Metric) -> str:
     group = found["group"]
     other = found["other"]
     test = f"{_SHORT[found['test']]}, {_p_text(found['p_holm'], found)}"
@@ -118,7 +117,7 @@ def _sentence_of_ranks(found: Row, metric: Metric) -> str:
     return f"By ranks, {greater} {greater_words(metric)} {less} ({test})."
 
 
-def _sentence_of_pairs(found: Row, metric: Metric) -> str:
+def _sentence_of_pairs(found: TableRow, metric: Metric) -> str:
     """Write in how many pairs, or comparisons of each mission with each, one has the better
     value.
     """
@@ -140,7 +139,7 @@ def _sentence_of_pairs(found: Row, metric: Metric) -> str:
     return f"{text}; {rest} {are} equal." if is_any_equal else f"{text}."
 
 
-def _wins(found: Row, metric: Metric) -> tuple[float, float]:
+def _wins(found: TableRow, metric: Metric) -> tuple[float, float]:
     """Return in which shares of pairs or comparisons the first, and the second, has the better
     value.
     """
@@ -174,14 +173,14 @@ def _without_mean(metric: Metric) -> str:
 # What a difference shows
 
 
-def _is_of_shares(found: Row) -> bool:
+def _is_of_shares(found: TableRow) -> bool:
     """Return whether shares of missions are compared, of which there are neither ranks nor pairs
     with more or less.
     """
     return found["test"] in (FISHER, MCNEMAR)
 
 
-def _is_equal(found: Row) -> bool:
+def _is_equal(found: TableRow) -> bool:
     """Return whether the two have the same value in each pair."""
     apart = found["difference"]
     return bool(
@@ -189,23 +188,23 @@ def _is_equal(found: Row) -> bool:
     )
 
 
-def _mean_p(found: Row) -> float:
+def _mean_p(found: TableRow) -> float:
     """Return the adjusted p of the difference of means, or of shares; nan if it is not known."""
     p = found["p_holm"] if _is_of_shares(found) else found.get("mean_p_holm")
     return math.nan if p is None else float(p)
 
 
-def _has_mean_shown(found: Row) -> bool:
+def _has_mean_shown(found: TableRow) -> bool:
     """Return whether a difference of the means, or of shares, may be claimed."""
     return _mean_p(found) < SIGNIFICANCE and not found["difference"].contains(0.0)
 
 
-def _has_ranks_shown(found: Row) -> bool:
+def _has_ranks_shown(found: TableRow) -> bool:
     """Return whether a difference by ranks may be claimed."""
     return bool(found["p_holm"] < SIGNIFICANCE) and _direction_of_ranks(found) != 0.0
 
 
-def _is_open(found: Row) -> bool:
+def _is_open(found: TableRow) -> bool:
     """Return whether the interval of the mean shows a difference, and the corrected test does
     not.
     """
@@ -213,7 +212,7 @@ def _is_open(found: Row) -> bool:
     return apart.has_interval and not apart.contains(0.0) and not _has_mean_shown(found)
 
 
-def _direction_of_ranks(found: Row) -> float:
+def _direction_of_ranks(found: TableRow) -> float:
     """Return the sign of the effect: above 0 if the first has the greater values, 0 if there is
     none.
     """
@@ -226,7 +225,7 @@ def _direction_of_ranks(found: Row) -> float:
 # Parts of sentences
 
 
-def _interval(found: Row, metric: Metric) -> str:
+def _interval(found: TableRow, metric: Metric) -> str:
     """Write the interval of a difference's size, in the direction in which a claim speaks."""
     apart = found["difference"]
     return _interval_text(-apart if apart.value < 0.0 else apart, metric)
@@ -237,15 +236,15 @@ def _interval_text(apart: Estimate, metric: Metric) -> str:
     return f"95% interval {text}" if text else "no interval"
 
 
-def _sizes(found: Row) -> str:
+def _sizes(found: TableRow) -> str:
     return number_of(found["n"], "pair") if found["paired"] else "not paired"
 
 
-def _mean_test(found: Row) -> str:
+def _mean_test(found: TableRow) -> str:
     return _SHORT[found["test"]] if _is_of_shares(found) else str(found["mean_test"])
 
 
-def _p_text(p: float, found: Row) -> str:
+def _p_text(p: float, found: TableRow) -> str:
     return p_text(p, is_adjusted=found.get("tests", 1) > 1)
 
 
@@ -263,7 +262,10 @@ def p_text(p: float, *, is_adjusted: bool = False) -> str:
 
 
 def overall_conclusion(
-    metric: Metric, differences: Sequence[Row], means: Mapping[str, float], groups: Sequence[str]
+    metric: Metric,
+    differences: Sequence[TableRow],
+    means: Mapping[str, float],
+    groups: Sequence[str],
 ) -> str:
     """Write the conclusion for the first metric: which manager is best on average, by how much, and
     what ranks and pairs show of it.
@@ -284,7 +286,7 @@ def overall_conclusion(
     return " ".join([*sentences, *_ranks_and_pairs_of_best(best, metric, against)])
 
 
-def _ranks_and_pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> list[str]:
+def _ranks_and_pairs_of_best(best: str, metric: Metric, against: Sequence[TableRow]) -> list[str]:
     """Write what ranks and pairs show of the best mean, where there are any."""
     ranked = [each for each in against if not _is_of_shares(each) and not _is_equal(each)]
     if not ranked:
@@ -292,22 +294,22 @@ def _ranks_and_pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) 
     return [_ranks_of_best(best, metric, ranked), _pairs_of_best(best, metric, ranked)]
 
 
-def _is_about(found: Row, metric: Metric, groups: Sequence[str]) -> bool:
+def _is_about(found: TableRow, metric: Metric, groups: Sequence[str]) -> bool:
     """Return whether a difference is tested, in this metric, and of two of these groups."""
     is_of_groups = {found["group"], found["other"]} <= set(groups)
     return bool(found["test"]) and found["metric"] == metric.name and is_of_groups
 
 
 def _means_of_best(
-    best: str, metric: Metric, against: Sequence[Row], means: Mapping[str, float], others: int
+    best: str, metric: Metric, against: Sequence[TableRow], means: Mapping[str, float], others: int
 ) -> list[str]:
     """Write how far the best mean is from the others, and whether that is shown.
 
     It is the best only if it is shown to be better than all others, of which there are so many.
     """
-    better: list[Row] = []
-    worse: list[Row] = []
-    alike: list[Row] = []
+    better: list[TableRow] = []
+    worse: list[TableRow] = []
+    alike: list[TableRow] = []
     for each in against:
         if not _has_mean_shown(each):
             alike.append(each)
@@ -325,7 +327,11 @@ def _means_of_best(
 
 
 def _claim_of_best(
-    best: str, metric: Metric, better: Sequence[Row], alike: Sequence[Row], is_best_of_all: bool
+    best: str,
+    metric: Metric,
+    better: Sequence[TableRow],
+    alike: Sequence[TableRow],
+    is_best_of_all: bool,
 ) -> str:
     """Write by how much the best mean is better than those from which it differs."""
     amounts = _and(_amounts(best, metric, better))
@@ -342,7 +348,7 @@ def _claim_of_best(
 
 
 def _claim_of_none(
-    best: str, metric: Metric, alike: Sequence[Row], means: Mapping[str, float]
+    best: str, metric: Metric, alike: Sequence[TableRow], means: Mapping[str, float]
 ) -> str:
     """Write that the best mean is not shown to differ from others."""
     if list(means.values()).count(means[best]) > 1:
@@ -355,11 +361,11 @@ def _claim_of_none(
     return f"No difference of the mean {_without_mean(metric)} is shown between {best}, which {has}, and {others}."
 
 
-def _ranks_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
+def _ranks_of_best(best: str, metric: Metric, against: Sequence[TableRow]) -> str:
     """Write from which others the one with the best mean differs by ranks, and how."""
-    less: list[Row] = []
-    greater: list[Row] = []
-    alike: list[Row] = []
+    less: list[TableRow] = []
+    greater: list[TableRow] = []
+    alike: list[TableRow] = []
     for each in against:
         if not _has_ranks_shown(each):
             alike.append(each)
@@ -378,7 +384,7 @@ def _ranks_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
     return f"By ranks, {'; '.join(clauses)}."
 
 
-def _pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
+def _pairs_of_best(best: str, metric: Metric, against: Sequence[TableRow]) -> str:
     """Write in how many pairs the one with the best mean has the better value."""
     opposite = "higher" if metric.better < 0 else "smaller"
     parts = []
@@ -402,7 +408,7 @@ def _pairs_of_best(best: str, metric: Metric, against: Sequence[Row]) -> str:
     return f"{best} has the {_better_word(metric)} {metric.title} {_and(parts)}."
 
 
-def _favours(found: Row, name: str, metric: Metric) -> bool:
+def _favours(found: TableRow, name: str, metric: Metric) -> bool:
     """Return whether a group is the better one in the runs that are compared, which need not be all
     that have a mean.
     """
@@ -411,7 +417,7 @@ def _favours(found: Row, name: str, metric: Metric) -> bool:
     return bool(metric.better * advantage > 0.0)
 
 
-def _not_shown(found: Row, best: str) -> str:
+def _not_shown(found: TableRow, best: str) -> str:
     """Name the other one, and what speaks for a difference, or that there is none at all."""
     if _is_equal(found):
         return f"{_other(found, best)} (equal in all {number_of(found['n'], 'pair')})"
@@ -420,7 +426,7 @@ def _not_shown(found: Row, best: str) -> str:
     return f"{_other(found, best)} ({_OPEN})" if _is_open(found) else _other(found, best)
 
 
-def _amounts(best: str, metric: Metric, better: Sequence[Row]) -> list[str]:
+def _amounts(best: str, metric: Metric, better: Sequence[TableRow]) -> list[str]:
     """Write by how much the best is better than each."""
     _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
     return [
@@ -429,23 +435,23 @@ def _amounts(best: str, metric: Metric, better: Sequence[Row]) -> list[str]:
     ]
 
 
-def _ps_of_ranks(rows: Sequence[Row]) -> str:
+def _ps_of_ranks(rows: Sequence[TableRow]) -> str:
     tests = " and ".join(dict.fromkeys(_SHORT[each["test"]] for each in rows))
     return f"{tests}, {_largest([float(each['p_holm']) for each in rows], rows[0])}"
 
 
-def _largest(ps: Sequence[float], found: Row) -> str:
+def _largest(ps: Sequence[float], found: TableRow) -> str:
     text = _p_text(max(ps), found)
     if len(ps) == 1:
         return text
     return f"all {text}" if "<" in text else f"largest {text}"
 
 
-def _other(found: Row, name: str) -> str:
+def _other(found: TableRow, name: str) -> str:
     return str(found["other"] if found["group"] == name else found["group"])
 
 
-def _others(rows: Sequence[Row], name: str) -> str:
+def _others(rows: Sequence[TableRow], name: str) -> str:
     return _and([_other(each, name) for each in rows])
 
 

@@ -418,7 +418,7 @@ def _draw_grid(
     image = axes.imshow(values, cmap="cividis", vmin=low, vmax=high, aspect="auto", origin="lower")
     for (row, column), mean in np.ndenumerate(grid):
         ink = "white" if mean.value < (low + high) / 2.0 else style.BLACK
-        look: dict[str, Any] = {"color": ink, "ha": "center"}
+        look: style.Look = {"color": ink, "ha": "center"}
         number = text(mean.value) if np.isfinite(mean.value) else ""
         if mean.has_interval:
             half = f"±{text((mean.high - mean.low) / 2.0)}"
@@ -587,7 +587,11 @@ def _folded(text: str, width: int = 26) -> str:
 
 @plain_arguments
 def draw_folder(folder: str | Path, out: str | Path) -> None:
-    """Draw the contents of a results folder, and write the picture; see draw_results."""
+    """Draw the contents of a results folder, and write the picture; see draw_results.
+
+    Example:
+        draw_folder("simulated", "simulated.pdf")
+    """
     draw_results([Path(folder)], Path(out))
 
 

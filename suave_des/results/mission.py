@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import cycle, groupby, pairwise
 from string import ascii_uppercase
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pandas
@@ -224,8 +224,8 @@ def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
 
 _IDLE_MODES = ("", UNGROUND_MODE, "inactive")
 _ZOOM_MARGIN_M = 0.6
-_PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
-_VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
+_PIPELINE: style.Look = {"color": "#CFCFCF", "lw": 4.0}
+_VISIBILITY: style.Look = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _BATTERY_COLOUR = style.GREEN
 _LETTER_OFFSETS = (
     (4, 4),
@@ -242,7 +242,7 @@ _LETTER_OFFSETS = (
 """Where a letter may stand beside its point, in points; the first that is free is taken."""
 _LETTER_POINTS = 9.0
 _LETTER_ROW_SHARE = 0.075
-_LETTER: dict[str, Any] = {"weight": "bold", "fontsize": 8}
+_LETTER: style.Look = {"weight": "bold", "fontsize": 8}
 
 
 class _Mark(NamedTuple):
@@ -346,7 +346,7 @@ def _marks(record: MissionRecord) -> Iterator[_Mark]:
         yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
 
 
-def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
+def _way_look(colours: dict[str, str], mode: str) -> style.Look:
     """Return the style of a stretch of the path: line widths distinguish the search altitudes
     without colours.
     """
@@ -468,7 +468,7 @@ def _draw_over_time(
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
         box = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
         height = top * (1.0 - _LETTER_ROW_SHARE * row)
-        look: dict[str, Any] = {"color": mark.colour, "bbox": box, **_LETTER}
+        look: style.Look = {"color": mark.colour, "bbox": box, **_LETTER}
         axes.text(mark.t_s, height, mark.letter, ha="center", va="top", **look)
     axes.set(
         ylim=(0.0, top),
@@ -522,7 +522,7 @@ _FAILED, _TASK, _ON = style.VERMILION, "#D9D9D9", "#9ECAE1"
 
 Rules = Mapping[tuple[float, str], Sequence[str]]
 """Names of the rules that made a function be adapted, by time (s) and function."""
-_Line = tuple[str, list[tuple[Span, str, str]]]
+_TimelineRow = tuple[str, list[tuple[Span, str, str]]]
 """A line of the chart: its name, and spans with colour and text."""
 
 
@@ -623,7 +623,7 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
     return [*times_s, record.end_s], [*altitudes_m, altitudes_m[-1]]
 
 
-def _lines(record: MissionRecord) -> Iterator[_Line]:
+def _lines(record: MissionRecord) -> Iterator[_TimelineRow]:
     """Yield the lines of the chart: tasks, the modes of each function, and failures."""
     yield "task", [(span, _TASK, plain(span.what)) for span in task_spans(record)]
     colours = style.MODE_COLOURS | mode_colours(record)
@@ -645,7 +645,7 @@ def _mode_colour(function: str, mode: str, colours: Mapping[str, str]) -> str:
     return style.ORANGE if "recover" in mode else _ON
 
 
-def _draw_lines(axes: Axes, lines: Sequence[_Line]) -> None:
+def _draw_lines(axes: Axes, lines: Sequence[_TimelineRow]) -> None:
     """Draw lines of bars, with a legend of those whose texts have no room."""
     end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
     legend: dict[str, str] = {}
@@ -665,7 +665,7 @@ def _draw_bars(axes: Axes, row: int, bars: Sequence[tuple[Span, str, str]], end_
     Returns:
         whether there is.
     """
-    look: dict[str, Any] = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
+    look: style.Look = {"edgecolor": "white", "lw": 0.6, "zorder": 2}
     for span, colour, _ in bars:
         axes.barh(row, span.end_s - span.begin_s, _BAR, span.begin_s, color=colour, **look)
     texts = list(_bar_texts(bars, end_s))

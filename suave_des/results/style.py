@@ -29,6 +29,8 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
 """For what has no colour of its own, in this order."""
 _KNOWN_MANAGERS = ("none", "random", "metacontrol", "bt")
 """They have the same look in every figure: that of their place here."""
+Look = dict[str, Any]
+"""Keywords of matplotlib, each with a type of its own."""
 _DASHES: tuple[Any, ...] = (
     "-",
     (0, (5, 1.5)),
@@ -76,7 +78,7 @@ def looks(names: Sequence[str]) -> list[int]:
     return found
 
 
-def line(number: int) -> dict[str, Any]:
+def line(number: int) -> Look:
     """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike,
     nor six in grey.
     """

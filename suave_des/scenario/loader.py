@@ -10,6 +10,7 @@ from typing import Any, TypedDict, Unpack
 from suave_des.arguments import plain_arguments
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown, unknown
+from suave_des.files import Json
 from suave_des.resources import hashes, shown_name
 from suave_des.scenario.models import REASONERS, Scenario, SignalTable, TableSignal, read_table
 from suave_des.scenario.modes import ModeTable, modes_of
@@ -101,6 +102,7 @@ def load_scenario(
 
     Files named inside a file are looked for beside it, then among the shipped ones.
 
+    Example:
         loaded = load_scenario("seams2023", reasoner="pellet")
 
     Args:
@@ -223,6 +225,7 @@ def _set(loaded: LoadedScenario, values: Mapping[str, object], option: str) -> L
 def with_values(loaded: LoadedScenario, values: Mapping[str, object]) -> LoadedScenario:
     """Replace the values at some key paths of a scenario.
 
+    Example:
         slower = with_values(loaded, {"signals.water_visibility.period_s": 120})
 
     Args:
@@ -271,7 +274,7 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
 # Values by their key paths, such as signals.water_visibility.period_s.
 
 
-def full_path(data: Mapping[str, Any], path: str) -> str:
+def full_path(data: Json, path: str) -> str:
     """Return a key path of a scenario in full: a signal needs no `signals.`, and visibility is
     water_visibility.
     """
@@ -284,7 +287,7 @@ def full_path(data: Mapping[str, Any], path: str) -> str:
     )
 
 
-def _keys(data: dict[str, Any], path: str) -> list[str]:
+def _keys(data: Json, path: str) -> list[str]:
     """The keys of a key path; names of managers may contain dots, and their settings may be
     missing.
     """
@@ -304,11 +307,11 @@ def _keys(data: dict[str, Any], path: str) -> list[str]:
     return ["managers", named, *(keys if keys != [""] else [])]
 
 
-def _has(holder: Any, key: str) -> bool:
+def _has(holder: object, key: str) -> bool:
     return isinstance(holder, dict) and key in holder
 
 
-def _did_you_mean(key: str, holder: dict[str, Any], *, is_top: bool) -> str:
+def _did_you_mean(key: str, holder: Json, *, is_top: bool) -> str:
     """Return the remedy for an unknown key; at the top of a scenario one that a section has is
     found.
     """
@@ -321,7 +324,7 @@ def _did_you_mean(key: str, holder: dict[str, Any], *, is_top: bool) -> str:
     return did_you_mean(key, sorted(named))
 
 
-def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
+def holder_of(data: Json, path: str) -> tuple[Any, Any]:
     """The mapping or list with the value at a key path of plain data, and its key; an InputError if
     there is none.
     """

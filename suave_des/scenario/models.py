@@ -155,7 +155,7 @@ Real = Annotated[float, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 Number = Annotated[Real, Field(ge=-LARGEST, le=LARGEST)]
 NotNegative = Annotated[Real, Field(ge=0, le=LARGEST)]
-Share = Annotated[Real, Field(ge=0, le=1)]
+Probability = Annotated[Real, Field(ge=0, le=1)]
 Coordinate = Annotated[Real, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Length = Annotated[Real, Field(gt=0, le=FARTHEST_M)]
 Duration = Annotated[Real, Field(gt=0, le=LONGEST_S)]
@@ -364,7 +364,7 @@ Component = Annotated[Real, Field(ge=-1, le=1)]
 class Monitor(Strict):
     """Faults that any monitor can have."""
 
-    dropout_probability: Share = 0.0
+    dropout_probability: Probability = 0.0
     """Probability that a message is lost."""
     outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
     """Intervals [from, to] in which every message is lost."""
@@ -792,7 +792,7 @@ class ThrusterFailureRevision(Strict):
     """
     effective_from_s: NotNegative = 0.0
     """Before this mission time, failures have no effect."""
-    loss_probability: Share = 0.0
+    loss_probability: Probability = 0.0
     """Probability of each failure to have no effect; it is published in any case."""
 
 

@@ -195,7 +195,7 @@ class _System(Strict):
     modes: Annotated[dict[str, dict[str, object]], Field(min_length=1)]
 
 
-class _Entry(Strict):
+class _FunctionEntry(Strict):
     ros__parameters: Annotated[_System | _Node, Field(discriminator="type")]
 
 
@@ -211,7 +211,7 @@ def modes_of(document: Layer) -> ModeTable:
             an undefined mode of a node, missing ros__parameters, a parameter of the wrong kind.
     """
     keys = _bare_names(document)
-    content = validated(document, dict[str, _Entry])
+    content = validated(document, dict[str, _FunctionEntry])
     entries = {name: content[key].ros__parameters for name, key in keys.items()}
     nodes = {
         name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)

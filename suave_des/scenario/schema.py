@@ -11,20 +11,21 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from suave_des.files import Json
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import models_within
 
 _EVENT_TEXT = r"^\s*\(\s*[1-6]\s*,\s*(failure|recovery)\s*,[^,]+\)\s*$"
 
 
-def scenario_schema() -> dict[str, Any]:
+def scenario_schema() -> Json:
     """JSON Schema (draft 2020-12) of a scenario file.
 
     What a mapping needs may stand in the base that it differs from: the loader alone checks that,
     and relations between values, such as a minimum that must not be above its maximum.
     """
     whole = Scenario.model_json_schema()
-    definitions: dict[str, Any] = whole.pop("$defs")
+    definitions: Json = whole.pop("$defs")
     definitions["Scenario"] = whole
     for model in dict.fromkeys(model for _, model in models_within(Scenario)):
         for name, text in field_docs(model).items():
@@ -63,7 +64,7 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _partial(schema: object) -> object:
+def _partial(schema: Any) -> Any:
     """The same schema with nothing required; a mapping may then fit several members of a union."""
     if isinstance(schema, list):
         return list(map(_partial, schema))

@@ -22,10 +22,10 @@ from pydantic_core import ErrorDetails
 from yaml.reader import ReaderError
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, line_error, shown
-from suave_des.files import decode, read_bytes
+from suave_des.files import Json, decode, read_bytes
 from suave_des.resources import find, shown_name
 
-SIZE_LIMIT_BYTES = 1_000_000
+YAML_LIMIT_BYTES = 1_000_000
 _VALUES_LIMIT = 100_000
 """An alias stands for all that it names, so that a few lines can be longer than memory."""
 
@@ -50,7 +50,7 @@ class Layer:
         above: key path of the data within the file, for messages.
     """
 
-    data: dict[str, Any]
+    data: Json
     places: Mapping[KeyPath, Location]
     above: KeyPath = ()
 
@@ -269,7 +269,7 @@ def read_input(
     """
     path = find_named(name, kind, by, key_path) if kind else Path(str(name))
     shown_as = shown_name(path)
-    content = read_bytes(path, SIZE_LIMIT_BYTES)
+    content = read_bytes(path, YAML_LIMIT_BYTES)
     inputs[shown_as] = hashlib.sha256(content).hexdigest()
     text = decode(path, content)
     return parse_yaml(text, path, depth)
@@ -390,9 +390,7 @@ def _is_below(path: KeyPath, others: set[KeyPath]) -> bool:
     return any(path[:length] in others for length in range(1, len(path) + 1))
 
 
-def _merge(
-    base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]
-) -> dict[str, Any]:
+def _merge(base: Json, over: Json, path: KeyPath, replaced: set[KeyPath]) -> Json:
     merged = dict(base)
     for key, value in over.items():
         below = (*path, key)

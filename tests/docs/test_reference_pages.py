@@ -1,9 +1,12 @@
 """What reference pages and README say of files, names and links is so."""
 
+import ast
+import inspect
 import re
 import shlex
 import subprocess
 import sys
+import textwrap
 import tomllib
 
 import make_cli_reference
@@ -140,6 +143,19 @@ def test_the_python_page_lists_the_names_of_the_package_each_with_an_example():
         block.text for block in blocks_of(PYTHON_PAGE) if block.language == "python"
     )
     assert not [name for name in names if not re.search(rf"\b{name}\b", examples)]
+
+
+def example_of(name):
+    """The code under "Example:" in the docstring of a public name, or of its type."""
+    text = inspect.getdoc(getattr(suave_des, name)) or ""
+    found = re.search(r"^Example:\n((?:    .*\n|\n)+)", text + "\n", flags=re.MULTILINE)
+    assert found, f"{name} has no example"
+    return re.sub(r"^(>>>|\.\.\.) ?", "", textwrap.dedent(found[1]), flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", sorted({*suave_des.__all__} - {"FAILED"}))
+def test_the_docstring_of_a_public_name_has_an_example_that_is_python(name):
+    ast.parse(example_of(name))
 
 
 def anchors(page):

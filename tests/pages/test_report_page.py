@@ -6,7 +6,7 @@ import shutil
 import pandas
 import pytest
 
-from suave_des.pages.report import LIMIT_BYTES, report_page
+from suave_des.pages.report import PAGE_LIMIT_BYTES, report_page
 from suave_des.results.style import line, looks
 from tests.helpers.browser import DESKTOP, PHONE, opened
 
@@ -163,7 +163,7 @@ def test_ten_thousand_missions_make_a_page_that_can_be_sent(campaign, tmp_path):
     rows = pandas.read_csv(campaign / "runs.csv")
     many = pandas.concat([rows.assign(run=rows.run + 8 * copy) for copy in range(625)])
     many.to_csv(tmp_path / "runs.csv", index=False)
-    assert len(report_page([tmp_path]).encode()) < LIMIT_BYTES
+    assert len(report_page([tmp_path]).encode()) < PAGE_LIMIT_BYTES
 
 
 @pytest.mark.parametrize("case", ["one run", "none found"])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError
 from suave_des.scenario.models import read_table
-from suave_des.scenario.yamlfile import SIZE_LIMIT_BYTES, read_yaml
+from suave_des.scenario.yamlfile import YAML_LIMIT_BYTES, read_yaml
 
 
 def refused(path: Path | str) -> str:
@@ -131,8 +131,8 @@ def test_what_is_nested_without_end_is_refused(write, content):
 
 
 def test_a_large_file_is_refused(write):
-    assert f"is larger than {SIZE_LIMIT_BYTES:,} bytes" in refused(
-        write("a.yaml", b"a: 1\n#" + b"x" * SIZE_LIMIT_BYTES)
+    assert f"is larger than {YAML_LIMIT_BYTES:,} bytes" in refused(
+        write("a.yaml", b"a: 1\n#" + b"x" * YAML_LIMIT_BYTES)
     )
 
 

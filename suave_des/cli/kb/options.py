@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from suave_des.cli.console import output
-from suave_des.cli.options import KnowledgeFiles, Reasoner
+from suave_des.cli.options import KnowledgeFiles, ReasonerOption
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
@@ -60,7 +60,7 @@ class KnowledgeOptions(KnowledgeFiles):
 class ReasonerOptions(KnowledgeOptions):
     """Options that name ontologies, rules and a reasoner to ask."""
 
-    reasoner: Reasoner = None
+    reasoner: ReasonerOption = None
     time_limit: TimeLimitS = 60.0
 
     def knowledge(self) -> KnowledgeBase:

@@ -22,7 +22,7 @@ from suave_des.knowledge.state import KnowledgeState
 #: What a reasoner may take for one state by default, in s.
 TIME_LIMIT_S = 60.0
 #: The longest limit; longer times are more than some systems can count.
-LONGEST_S = 1e6
+LONGEST_LIMIT_S = 1e6
 #: What a reasoner does at first, for the message.
 LOADING = "loading the ontologies"
 _Result = TypeVar("_Result")
@@ -69,9 +69,11 @@ class TimeLimit:
     """
 
     def __init__(self, seconds: float = TIME_LIMIT_S, option: str | None = None) -> None:
-        if not 0.0 < seconds <= LONGEST_S:
+        if not 0.0 < seconds <= LONGEST_LIMIT_S:
             problem = f"{option or 'time limit'}: {seconds:g} is out of range"
-            raise KnowledgeError(problem, remedy=f"give seconds above 0, at most {LONGEST_S:g}")
+            raise KnowledgeError(
+                problem, remedy=f"give seconds above 0, at most {LONGEST_LIMIT_S:g}"
+            )
         self.seconds = seconds
         self._option = option
         self._thread: _ReasonerThread | None = None

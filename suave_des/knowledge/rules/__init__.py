@@ -60,7 +60,7 @@ Term = Variable | Named | Lit
 #: The kinds of atoms that SWRL has; "" is an atom whose name has not been looked up yet.
 AtomKind = Literal["", "class", "object", "data", "range", "same", "different", "builtin"]
 #: Kind by the name of the RDF class of an atom.
-KINDS: dict[str, AtomKind] = {
+ATOM_KINDS: dict[str, AtomKind] = {
     SWRL + "ClassAtom": "class",
     SWRL + "IndividualPropertyAtom": "object",
     SWRL + "DatavaluedPropertyAtom": "data",

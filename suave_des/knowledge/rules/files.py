@@ -439,7 +439,7 @@ def _bound_in(rule: Rule) -> set[str]:
 
 # Rules as text.
 
-MAX_BYTES = 8 * 2**20
+RULES_LIMIT_BYTES = 8 * 2**20
 
 
 @dataclass(frozen=True)
@@ -463,7 +463,7 @@ class RulesFile:
         Raises:
             InputError: it is missing, a folder, too large, or not text in UTF-8.
         """
-        text = decode(path, read_bytes(path, MAX_BYTES))
+        text = decode(path, read_bytes(path, RULES_LIMIT_BYTES))
         if text.lstrip().startswith("<?xml"):
             raise InputError(
                 "this is XML, not rules as text", file=path, remedy="give it with --ontology"
@@ -571,7 +571,7 @@ _PREDICATE_OF = {
     "builtin": "builtin",
 }
 _NAMES: Mapping[str, str] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
-_CLASS_OF = {kind: name for name, kind in swrl.KINDS.items()}
+_CLASS_OF = {kind: name for name, kind in swrl.ATOM_KINDS.items()}
 #: Ends the names that rules without one get.
 WITHOUT_NAME = "without a name"
 #: Begins the IRIs given to variables, as Protégé does.
@@ -637,7 +637,7 @@ def _read_side(file: OntologyFile, rule: str, side: str, names: dict[str, str]) 
 
 def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> Atom:
     kinds = file.kinds(node)
-    kind: AtomKind = next((swrl.KINDS[name] for name in kinds if name in swrl.KINDS), "")
+    kind: AtomKind = next((swrl.ATOM_KINDS[name] for name in kinds if name in swrl.ATOM_KINDS), "")
     predicates = (
         file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values())
     )
