@@ -23,18 +23,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from suave_des import load_scenario, run_campaign
-from suave_des.reality.assisted import (
-    EACH_OF_TWO,
-    LEAST_TO_WEIGH,
-    UNLIKE,
-    USEFUL,
-    compare_assisted,
-    spread_of,
-)
-from suave_des.records.missions import missions_in
-from suave_des.results import style
-from suave_des.results.groups import grouped
+from suave_des import CampaignFrame, load_scenario, run_campaign
 
 SCENARIO = "planta_exp1"
 MANAGERS = ("none", "metacontrol", "bt")
@@ -84,6 +73,12 @@ OF_ALL_METRICS = 5
 SPLIT_S, SPLIT = 65.0, 0.4
 """Of real missions under a condition that has two outcomes, such as 115, 117, 180, 115, 181 s: how
 far these are apart, and the share of the later one.
+"""
+
+UNLIKE, LEAST_TO_WEIGH, USEFUL, EACH_OF_TWO = 0.1, 10, 0.5, 0.975
+"""As of the estimator: share of all conditions that may be unlike those sampled, conditions from
+which on the weight is estimated, what the simulation may leave of fewer, and the confidence of each
+of two intervals.
 """
 
 Array = NDArray[np.float64]
@@ -280,8 +275,8 @@ def sampled(
 
 
 def intervals(of: Sampled, spread: Array | float | None) -> tuple[Array, Array, Array]:
-    """Return mean, half-width and weight of each sample as reality.assisted.assisted_mean estimates
-    them, but for all samples at once; a test compares the two.
+    """Return mean, half-width and weight of each sample as `CampaignFrame.assist` estimates them,
+    but for all samples at once; a test compares the two.
     """
     samples, conditions = of.real.shape
     if conditions >= LEAST_TO_WEIGH:
@@ -324,7 +319,9 @@ def _weight_of_least_variance(of: Sampled) -> Array:
 def simulated_spread(case: Case, both: Sequence[str]) -> float:
     """Return the greater standard deviation of conditions of two managers."""
     cells = (case.simulator[name] for name in both)
-    return max(spread_of(each[:, 0], float(each.var(axis=1, ddof=1).mean())) for each in cells)
+    return max(
+        max(0.0, each[:, 0].var(ddof=1) - each.var(axis=1, ddof=1).mean()) ** 0.5 for each in cells
+    )
 
 
 def coverage(
@@ -379,7 +376,7 @@ def cover(systems: Mapping[str, pandas.DataFrame], resamples: int) -> Iterator[d
 # Gains
 
 
-def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFrame:
+def gains(same: CampaignFrame, population: pandas.DataFrame) -> pandas.DataFrame:
     """Compare parts of the real missions, one to five under each of the six conditions, with all of
     them.
 
@@ -389,14 +386,12 @@ def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFr
     """
     real = pandas.read_csv(REAL).drop(columns="run")
     real = real[real["manager"].isin(MANAGERS)]
-    simulated = missions_in(same), missions_in(population)
     real["place"] = real.groupby(["manager", "condition"]).cumcount()
     rows = []
     for runs_each in (1, 2, 5):
         for first in range(0, 6 - runs_each, runs_each):
             part = real[real["place"].between(first, first + runs_each - 1)].drop(columns="place")
-            groups = grouped(missions_in(part), metrics=METRICS, simulated=simulated)
-            found = compare_assisted(groups).estimates
+            found = same.assist(part, population, metrics=METRICS).estimates
             for name in ("alone", "assisted"):
                 ends = found[f"{name}_ci95_low"], found[f"{name}_ci95_high"]
                 found[f"{name}_half"] = (ends[1] - ends[0]) / 2.0
@@ -406,7 +401,7 @@ def gains(same: pandas.DataFrame, population: pandas.DataFrame) -> pandas.DataFr
     return pandas.concat(rows).groupby(by, sort=False)[columns].median().reset_index()
 
 
-def under_real_conditions(runs: int, workers: int) -> pandas.DataFrame:
+def under_real_conditions(runs: int, workers: int) -> CampaignFrame:
     """Run missions under the six conditions of the real ones."""
     return run_campaign(
         "planta_exp1_campaign",
@@ -494,11 +489,11 @@ def draw(figure: Figure, covered: pandas.DataFrame) -> None:
     own = covered[is_drawn & (covered["runs_each"] == 1)]
     cases = list(own["case"].unique())
     left, right = figure.subplots(1, 2, sharey=True)
-    for side, colour, shift in (("alone", style.GREY, 0.15), ("assisted", style.BLUE, -0.15)):
+    for side, colour, shift in (("alone", studies.GREY, 0.15), ("assisted", studies.BLUE, -0.15)):
         places = [len(cases) - cases.index(case) + shift for case in own["case"]]
         left.plot(100.0 * own[side], places, "o", ms=3.0, color=colour, alpha=0.6)
         right.plot(own[f"{side}_half"], places, "o", ms=3.0, color=colour, alpha=0.6, label=side)
-    left.axvline(95.0, color=style.GREY, lw=0.7, ls=":")
+    left.axvline(95.0, color=studies.GREY, lw=0.7, ls=":")
     left.set(xlabel="intervals that hold the mean (%)")
     left.set_yticks([len(cases) - place for place in range(len(cases))], cases)
     right.set(xlabel="half-width (s)", xscale="log")

@@ -31,7 +31,6 @@ from calibration.cases import (
 from calibration.fit import FINAL_FACTOR, Profile, fit, profiles, select
 from calibration.loss import Evaluation, evaluate, resampling_spread
 from suave_des import InputError
-from suave_des.results import style
 
 COLUMNS = 4
 """Of panels."""
@@ -68,14 +67,14 @@ def draw_profiles(
     panels = figure.subplots(_lines(found), COLUMNS, sharey=True, squeeze=False).ravel()
     for panel, profile in zip(panels, found, strict=False):
         panel.axvspan(profile.low, profile.high, color="#D6E6F2", lw=0)
-        panel.axhline(threshold, color=style.GREY, lw=0.8, ls="--")
+        panel.axhline(threshold, color=studies.GREY, lw=0.8, ls="--")
         points = sorted(
             [*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)]
         )
         panel.plot(
-            [x for x, _ in points], [y for _, y in points], color=style.BLUE, marker=".", ms=4
+            [x for x, _ in points], [y for _, y in points], color=studies.BLUE, marker=".", ms=4
         )
-        panel.plot([profile.best], [best.loss], marker="D", color=style.VERMILION, ms=4)
+        panel.plot([profile.best], [best.loss], marker="D", color=studies.VERMILION, ms=4)
         panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
         panel.set_ylim(0.0, threshold + 4.0 * (threshold - best.loss))
         panel.set_title(_title(profile.parameter), fontsize=6.5)

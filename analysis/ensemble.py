@@ -30,8 +30,7 @@ import numpy as np
 from calibration.cases import FreeParameter, Problem, read_cases, read_problem
 from calibration.fit import larger
 from calibration.loss import evaluate, resampling_spread
-from suave_des import load_scenario
-from suave_des.reality.missions import read_conditions
+from suave_des import load_scenario, read_conditions
 
 Values = Mapping[str, float]
 Losses = tuple[float, ...]

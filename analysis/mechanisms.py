@@ -23,8 +23,7 @@ import studies
 
 from calibration.cases import Case, Problem, read_cases
 from calibration.loss import compare, simulate_case
-from suave_des import validate, with_values
-from suave_des.reality.validation import COMPARED, compare_conditions, over_conditions
+from suave_des import compare_conditions, validate, with_values
 
 SHARE_2025 = 10
 """Missions for each manager of 2023 to one for each manager and condition of 2025."""
@@ -167,15 +166,17 @@ def agreement_2025(runs: int, change: Change) -> dict[str, float]:
     simulated, distance = simulated_and_distance(
         case, {**change.both, **change.of_2025}, runs * len(case.conditions)
     )
-    compared = compare_conditions(case.real, simulated, case.managers, COMPARED)
-    summaries = over_conditions(compared).set_index(["manager", "metric"])
-    spread = summaries.loc["none", "distance_inspected_m"]
+    metrics = ["search_time_s", "distance_inspected_m", "mean_reaction_time_s"]
+    compared = compare_conditions(case.real, simulated, case.managers, metrics)
+    times = compared.query("metric == 'search_time_s'")
+    of_none = compared.query("manager == 'none' and metric == 'distance_inspected_m'")
+    spread = of_none[["simulated_std", "real_std"]].dropna().median()
     reactions = compared.query("manager == 'metacontrol' and metric == 'mean_reaction_time_s'")[
         "simulated_median"
     ]
     return {
         "distance_2025": distance,
-        "median_apart_2025_s": float(summaries.loc[("all", "search_time_s"), "difference"]),
+        "median_apart_2025_s": float(times["difference_of_medians"].abs().median()),
         "spread_of_none_2025_m": float(spread["simulated_std"]),
         "real_spread_of_none_2025_m": float(spread["real_std"]),
         "reactions_2025_s": float(np.ptp(reactions.to_numpy()[:FIRST_CONDITIONS])),

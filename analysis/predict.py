@@ -45,7 +45,6 @@ from scipy.special import stdtrit
 from structural_error import measured_shares
 
 from suave_des import InputError, mean_of, read_ensemble, read_real, read_runs, run_campaign
-from suave_des.errors import line_error
 
 FOLDER = Path(__file__).with_name("predictions")
 ROOT = Path(__file__).parents[1]
@@ -380,6 +379,10 @@ def _difference(
 # The conditions of real runs
 
 
+def _at_line(file: Path, line: int, problem: str, remedy: str) -> InputError:
+    return InputError(problem, file=file, place=f"line {line}", remedy=remedy)
+
+
 def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
     """Read real runs of an experiment, each with the number of its condition, from 1.
 
@@ -400,10 +403,10 @@ def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
     for manager, own in runs.groupby("manager", sort=False):
         possible = fits[own.index]
         for row in own.index[~possible.any(axis=1)]:
-            raise line_error(*places[row], *_no_condition(experiment, runs.loc[row]))
+            raise _at_line(*places[row], *_no_condition(experiment, runs.loc[row]))
         if manager not in managers:
             problem = f"nothing is predicted of manager {manager} in {experiment}"
-            raise line_error(*places[own.index[0]], problem, f"of {', '.join(managers)}")
+            raise _at_line(*places[own.index[0]], problem, f"of {', '.join(managers)}")
         if (possible.sum(axis=1) > 1).any():
             possible = _in_order(possible)
         for row, found in zip(own.index, possible, strict=True):
@@ -411,7 +414,7 @@ def assigned(experiment: str, files: Sequence[Path]) -> pandas.DataFrame:
                 listed = " or ".join(str(number + 1) for number in np.flatnonzero(fits[row]))
                 problem = f"this run may be of condition {listed}, and the order does not tell"
                 remedy = "add a column condition, or failure_time_s if thrusters fail"
-                raise line_error(*places[row], problem, remedy)
+                raise _at_line(*places[row], problem, remedy)
             numbers[row] = found.argmax() + 1
     return runs.assign(condition=numbers)
 

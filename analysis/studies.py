@@ -15,24 +15,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib.style
 import numpy as np
 import pandas
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from suave_des import mean_of, run_campaign
-from suave_des.results import style
 
 FIRST_RUNS = 3
 SEED = 1
 FEW = 500
 """Missions that are done in this process before others have started."""
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
-_MANAGERS = ("none", "random", "metacontrol", "bt")
-COLOURS = {
-    name: style.line(look)["color"]
-    for name, look in zip(_MANAGERS, style.looks(_MANAGERS), strict=True)
-}
+WIDTH_IN = 7.0
+"""Text width of a two-column paper."""
+BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8A8A8A"
+COLOURS = {"none": BLUE, "random": "#E69F00", "metacontrol": "#009E73", "bt": "#CC79A7"}
+"""Of managers, as in all figures: Okabe and Ito's."""
 
 
 @dataclass(frozen=True)
@@ -173,8 +173,8 @@ def _cell(value: Any) -> Any:
 
 def figure_of(draw: Callable[..., None], *drawn: Any, height: float) -> Figure:
     """Draw a figure in the look of all figures: `draw` gets it, and what is to be drawn."""
-    with style.publication():
-        figure = Figure(figsize=(style.WIDTH_IN, height), layout="constrained")
+    with matplotlib.style.context("suave_des.figures"):
+        figure = Figure(figsize=(WIDTH_IN, height), layout="constrained")
         draw(figure, *drawn)
     return figure
 
@@ -202,7 +202,7 @@ def draw_intervals(
     for place, (_, row) in zip(places, rows.iterrows(), strict=True):
         mean = row["mean_difference"]
         ends = [mean if np.isnan(end) else end for end in (row["low95"], row["high95"])]
-        colour = style.BLUE if ends[0] > 0.0 or ends[1] < 0.0 else style.GREY
+        colour = BLUE if ends[0] > 0.0 or ends[1] < 0.0 else GREY
         errors = np.abs([[ends[0] - mean], [ends[1] - mean]])
         look = {"fmt": "o", "ms": 3.0, "color": colour, "capsize": 2.0}
         if across:

@@ -30,8 +30,8 @@ if _TYPE_CHECKING:
     from suave_des.managing.simple import NoManager, Threshold
     from suave_des.metrics.result import MissionResult
     from suave_des.monitor.diagnostics import FAILED, Kind
-    from suave_des.reality.missions import read_real
-    from suave_des.reality.validation import compare_with_paper, validate
+    from suave_des.reality.missions import read_conditions, read_real, read_targets
+    from suave_des.reality.validation import compare_conditions, compare_with_paper, validate
     from suave_des.records.runs import read_runs
     from suave_des.resources import find
     from suave_des.results.compare import compare_folders
@@ -58,12 +58,15 @@ __all__ += [
 ]
 __all__ += ["FAILED", "Kind", "PipelineInspection", "train"]
 __all__ += [
+    "compare_conditions",
     "compare_folders",
     "compare_with_paper",
     "draw_folder",
     "mean_of",
+    "read_conditions",
     "read_real",
     "read_runs",
+    "read_targets",
     "validate",
 ]
 __all__ += ["InputError", "KnowledgeBase", "MissionError", "SuaveDesError", "find"]
@@ -90,8 +93,8 @@ _HOMES = {
         "resources": ("find",),
         "results.compare": ("compare_folders",),
         "results.figures": ("draw_folder",),
-        "reality.missions": ("read_real",),
-        "reality.validation": ("compare_with_paper", "validate"),
+        "reality.missions": ("read_conditions", "read_real", "read_targets"),
+        "reality.validation": ("compare_conditions", "compare_with_paper", "validate"),
         "scenario.loader": ("load_scenario", "with_values"),
         "simulation.mission": ("Mission",),
         "simulation.simulator": ("Simulator",),

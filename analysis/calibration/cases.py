@@ -14,21 +14,20 @@ from typing import Any
 import pandas
 import yaml
 
-from suave_des import InputError, find, load_scenario, read_real, with_values
-from suave_des.campaign.spec import read_campaign_file
-from suave_des.campaign.variation import Variation, vary
-from suave_des.reality.missions import (
-    PAPERS_RUNS,
-    Share,
-    conditions_of,
-    count,
-    published_for,
-    targets_of,
+from suave_des import (
+    InputError,
+    find,
+    load_scenario,
+    read_conditions,
+    read_real,
+    read_targets,
+    with_values,
 )
-from suave_des.records.runs import CONDITION
-from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import LoadedScenario
 
+CONDITION = "condition"
+"""Column with the number of a mission's condition."""
+PAPERS_RUNS = "seams2023_runs"
+"""The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""
 FOLDER = Path(__file__).parent
 """Where files of free parameters are."""
 ONLY_CONDITION = 1
@@ -58,7 +57,7 @@ class Case:
     conditions: Mapping[int, Mapping[str, Any]] = field(
         default_factory=lambda: {ONLY_CONDITION: {}}
     )
-    shares: tuple[tuple[Share, float], ...] = ()
+    shares: tuple[tuple[Any, float], ...] = ()
     base: str = ""
     digests: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -130,27 +129,29 @@ def _files_of(given: str, data: Sequence[str], *, only: bool) -> list[Path]:
         if only or word.startswith(f"{name}=")
     ]
     files = [find(word.removeprefix(f"{name}="), "scenarios/published") for word in words]
-    published = published_for(given) or (find(PAPERS_RUNS, "scenarios/published") if only else None)
-    if not files and published is None:
+    published = find(PAPERS_RUNS, "scenarios/published")
+    own = published.with_name(f"{name}_runs.csv")
+    if not files and not own.is_file() and not only:
         raise InputError(
             f"{name}: there are no published runs of this scenario",
             remedy=f"give --data {name}=FILE",
         )
-    return files or [path for path in (published,) if path]
+    return files or [own if own.is_file() else published]
 
 
 def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
-    loaded, variation, base = _read_varied(given)
-    points = [variation.sweep.values(point) for point in range(variation.sweep.points)]
-    if len(points) == 1:
-        loaded, real = variation.scenario(loaded, 0), read_real(files)
-        conditions: dict[int, dict[str, Any]] = {ONLY_CONDITION: {}}
+    base, perturbations = _scenario_of(given)
+    loaded = with_values(load_scenario(base), perturbations)
+    swept = read_conditions(given)
+    conditions: dict[int, dict[str, Any]] = {
+        number: dict(values) for number, values in enumerate(swept.to_dict("records"), 1)
+    }
+    if len(conditions) > 1:
+        real = read_real(files, swept)
     else:
-        real = read_real(files, conditions_of(variation.sweep))
-        conditions = {
-            number: {variation.paths[name]: value for name, value in values.items()}
-            for number, values in enumerate(points, 1)
-        }
+        loaded = with_values(loaded, conditions.get(ONLY_CONDITION, {}))
+        real = read_real(files)
+        conditions = {ONLY_CONDITION: {}}
     own = real.choose(managers.split(",") if managers else ())
     frame = real.frame[real.frame["manager"].isin(own)].reset_index(drop=True)
     if CONDITION not in frame:
@@ -158,29 +159,28 @@ def _read_case(given: str, files: Sequence[Path], managers: str | None) -> Case:
     made = {
         number: values for number, values in conditions.items() if number in set(frame[CONDITION])
     }
-    shares = _counted([share for share in targets_of(real)[0] if share.manager in own], frame)
+    shares = _counted([share for share in read_targets(real)[0] if share.manager in own], frame)
     digests = {path.name: digest for path, digest in real.files.items()}
     name = Path(given).stem.removesuffix("_campaign")
     return Case(name, loaded, frame, made, shares, base, digests, real.notes)
 
 
-def _read_varied(given: str) -> tuple[LoadedScenario, Variation, str]:
-    """Read a scenario, what its campaign file sweeps, and the scenario's own file as another can
-    name it.
+def _scenario_of(given: str) -> tuple[str, dict[str, Any]]:
+    """Return the scenario that a campaign file names, and what it perturbs; of a scenario itself
+    nothing.
     """
-    file = read_campaign_file(given)
-    if file is None:
-        return load_scenario(given), Variation(), given
-    settings = file.settings
-    varied = vary(
-        load_scenario(file.scenario), settings.sweep, settings.perturbations, settings.runs_per_draw
-    )
-    return *varied, str(file.scenario)
+    file = find(given, "scenarios")
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    if "campaign" not in content:
+        return given, {}
+    beside = file.with_name(content["scenario"])
+    base = str(beside) if beside.is_file() else content["scenario"]
+    return base, content.get("perturbations", {})
 
 
-def _counted(shares: Sequence[Share], real: pandas.DataFrame) -> tuple[tuple[Share, float], ...]:
+def _counted(shares: Sequence[Any], real: pandas.DataFrame) -> tuple[tuple[Any, float], ...]:
     """Count shares in real missions; those of which nothing is known are left out."""
-    counted = [(each, *count(each, real)) for each in shares]
+    counted = [(each, *each.count(real)) for each in shares]
     return tuple((each, number / n) for each, number, n in counted if n)
 
 
@@ -342,7 +342,7 @@ def fitted_scenario(problem: Problem, case: Case, values: Sequence[float], folde
     if "revision" in data:
         data["revision"] = {"base": fitted.scenario.revision.name, **data["revision"]}
     file = find(case.base, "scenarios")
-    is_shipped = file.is_relative_to(shipped_folder("scenarios"))
+    is_shipped = file.is_relative_to(find("seams2023", "scenarios").parent)
     base = Path(case.base).name if is_shipped else Path(os.path.relpath(file, folder)).as_posix()
     text = yaml.safe_dump({"base": base, **data}, sort_keys=False, allow_unicode=True)
     return f"# Fitted by analysis/calibrate.py; calibration.json says how.\n{text}"

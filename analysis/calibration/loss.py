@@ -12,6 +12,7 @@ loss of several scenarios is the mean of theirs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,11 +21,8 @@ import pandas
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from calibration.cases import Case, Problem
-from suave_des import Simulator, with_values
-from suave_des.reality.missions import count
-from suave_des.reality.validation import balanced, compare_conditions
-from suave_des.records.runs import CONDITION
+from calibration.cases import CONDITION, Case, Problem
+from suave_des import Simulator, compare_conditions, with_values
 
 Vectors = NDArray[np.float64]
 """Missions as scaled vectors, shape (n, 2 or 3); unknown components are nan."""
@@ -141,14 +139,30 @@ def compare(case: Case, simulated: pandas.DataFrame) -> CaseLoss:
     }
     difference = 0.0
     if case.shares:
-        alike = balanced(case.real, simulated, case.managers) if case.has_conditions else simulated
-        counted = [count(share, alike) for share, _ in case.shares]
+        alike = balanced(case, simulated) if case.has_conditions else simulated
+        counted = [share.count(alike) for share, _ in case.shares]
         apart = [
             abs(number / max(1, n) - real)
             for (number, n), (_, real) in zip(counted, case.shares, strict=True)
         ]
         difference = float(np.mean(apart))
     return CaseLoss(distances, difference)
+
+
+def balanced(case: Case, simulated: pandas.DataFrame) -> pandas.DataFrame:
+    """Leave out simulated missions so that each manager has them in the real missions' proportions
+    of conditions.
+    """
+    kept = []
+    for manager in case.managers:
+        real = case.real.loc[case.real["manager"] == manager, CONDITION].value_counts().sort_index()
+        ours = simulated[simulated["manager"] == manager]
+        factor = float((ours[CONDITION].value_counts().reindex(real.index) / real).min())
+        factor = math.floor(factor) or factor  # fewer simulated than real ones
+        wanted = (factor * real // 1.0).clip(lower=1.0)
+        is_wanted = ours.groupby(CONDITION).cumcount() < ours[CONDITION].map(wanted).fillna(0)
+        kept.append(ours[is_wanted])
+    return pandas.concat(kept)
 
 
 def _pairs(

@@ -6,18 +6,20 @@ design needs, and what thrusters are reported as.
 
 from __future__ import annotations
 
+import csv
+import io
 import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, THRUSTER_NAMES
-from suave_des.files import csv_text, write_file
-from suave_des.knowledge.state import NO_GROUNDING
-from suave_des.monitor.diagnostics import FAILED, RECOVERED
-from suave_des.resources import shipped_folder
+from suave_des import FAILED, find
 
-SEARCH, FOLLOW, MOTION = GENERATE_SEARCH_PATH, FOLLOW_PIPELINE, MAINTAIN_MOTION
+SEARCH, FOLLOW, MOTION = "f_generate_search_path", "f_follow_pipeline", "f_maintain_motion"
+THRUSTER_NAMES = tuple(f"c_thruster_{number}" for number in range(1, 7))
+RECOVERED = "RECOVERED"
+NO_GROUNDING, STAYS, NONE_LEFT = "ungrounded", "stays", "none left"
+"""In decision tables: no design in use yet, and what is decided but for a design."""
 DESIGNS = {
     SEARCH: ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low"),
     FOLLOW: ("fd_follow_pipeline",),
@@ -112,7 +114,10 @@ def table(settings: str, decide: Decide, least_m: dict[str, float]) -> str:
             thens = [then if name == function else "" for name in found]
             seen = words[visibility] if sees else ""
             rows += [[seen, each, *nows, *thens] for each in said]
-    return settings + csv_text(columns, rows)
+    text = io.StringIO(settings)
+    text.seek(0, io.SEEK_END)
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
 
 
 def _check_independence(by_state: dict[tuple[str | None, str, str], str], place: int) -> None:
@@ -126,6 +131,6 @@ def _check_independence(by_state: dict[tuple[str | None, str, str], str], place:
 
 def write(name: str, text: str) -> Path:
     """Write a table where the shipped ones are."""
-    path = shipped_folder("scenarios/managers") / f"{name}.csv"
-    write_file(path, text)
+    path = find("seams2023", "scenarios").parent / "managers" / f"{name}.csv"
+    path.write_text(text, encoding="utf-8")
     return path

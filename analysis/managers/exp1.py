@@ -15,15 +15,14 @@ from pathlib import Path
 
 import pandas
 
-from suave_des.resources import find
-from suave_des.tables import Table
+from suave_des import find
 
 _CONDITION = "start.y_m"
 _METRICS = {"search_time_s": "search time, s", "distance_inspected_m": "distance, m"}
 
 
-def table(runs: pandas.DataFrame, published: pandas.DataFrame) -> Table:
-    """Tabulate missions of a campaign beside published ones."""
+def table(runs: pandas.DataFrame, published: pandas.DataFrame) -> str:
+    """Tabulate missions of a campaign beside published ones, in Markdown."""
     rows = []
     for manager, missions in runs.groupby("manager", sort=False):
         theirs = published[published["manager"] == manager]
@@ -35,11 +34,10 @@ def table(runs: pandas.DataFrame, published: pandas.DataFrame) -> Table:
             cells.append(f"{theirs[metric].mean():.1f}" if len(theirs) else "not here")
         rows.append(cells)
     headings = [each for name in _METRICS.values() for each in (name, "published")]
-    return Table(["manager", "missions", *headings], rows)
+    lines = [["manager", "missions", *headings], ["---", *["---:"] * (len(headings) + 1)], *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 if __name__ == "__main__":
     missions = pandas.read_csv(Path(sys.argv[1]) / "runs.csv")
-    print(
-        table(missions, pandas.read_csv(find("planta_exp1_runs", "scenarios/published"))).markdown()
-    )
+    print(table(missions, pandas.read_csv(find("planta_exp1_runs", "scenarios/published"))))

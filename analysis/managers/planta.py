@@ -32,9 +32,18 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from managers.exemplar import DESIGNS, NEEDED_M, SEARCH, State, table, write
-from suave_des.errors import InputError
-from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
+from managers.exemplar import (
+    DESIGNS,
+    NEEDED_M,
+    NO_GROUNDING,
+    NONE_LEFT,
+    SEARCH,
+    STAYS,
+    State,
+    table,
+    write,
+)
+from suave_des import InputError
 
 DOMAIN = Path(__file__).with_name("domain.pddl")
 SETTINGS = """## PLANTA, written by analysis/managers/planta.py with Fast Downward; it says what is known of it and what is assumed.

@@ -17,8 +17,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from managers.exemplar import DESIGNS, NEEDED_M, SEARCH, State, table, write
-from suave_des.knowledge.state import NONE_LEFT, STAYS
+from managers.exemplar import DESIGNS, NEEDED_M, NONE_LEFT, SEARCH, STAYS, State, table, write
 
 SETTINGS = """## ROSA, written by analysis/managers/rosa.py, which says what is known of it and what is assumed.
 ## It plans at each diagnostic and at each task (its code); how long its queries take is not known.

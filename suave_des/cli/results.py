@@ -246,8 +246,8 @@ def validate(
         published_for,
         read_conditions,
         read_real,
+        read_targets,
         runs_in_a_row,
-        targets_of,
     )
     from suave_des.reality.validation import validate as compare
 
@@ -260,7 +260,7 @@ def validate(
     files_of_data = [find(each, "scenarios/published") for each in data]
     real = read_real(files_of_data, conditions, runs_in_a_row(name))
     chosen = real.choose(comma_separated(managers))
-    shares, limits, targets_paths = targets_of(real, targets)
+    shares, limits, targets_paths = read_targets(real, targets)
     result: CampaignResult | None = None
     if runs_file is not None:
         recorded = _recorded(runs_file, list(conditions.columns), chosen, options)

@@ -103,6 +103,16 @@ class Share(Strict):
             raise wrong("a share is between 0 and 1", "such as target: [0.25, 0.65]", "target")
         return self
 
+    def count(self, runs: pandas.DataFrame) -> tuple[int, int]:
+        """Count the missions in this share, and those that it is a share of; runs have the columns
+        of records.runs.COLUMNS.
+        """
+        own = runs[runs["manager"] == self.manager]
+        if self.of == "detections":
+            own = own[own["detection_x_m"].notna()]
+        among = own[_inside(own, self.among)]
+        return int(_inside(among, self.where).sum()), len(among)
+
 
 class ConditionLimits(Strict):
     """How near a metric must come where the conditions of the real missions are known."""
@@ -126,17 +136,6 @@ class Targets(Strict):
         Literal["search_time_s", "distance_inspected_m", "mean_reaction_time_s"], ConditionLimits
     ] = Field(default_factory=dict)
     """By metric, over all managers."""
-
-
-def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
-    """Count the missions in a share, and those that it is a share of; runs have the columns of
-    records.runs.FRAME_COLUMNS.
-    """
-    own = runs[runs["manager"] == share.manager]
-    if share.of == "detections":
-        own = own[own["detection_x_m"].notna()]
-    among = own[_inside(own, share.among)]
-    return int(_inside(among, share.where).sum()), len(among)
 
 
 def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
@@ -353,7 +352,7 @@ def read_real(
 
     Args:
         paths: of files such as read_runs takes; the exemplar writes one for each manager.
-        conditions: of the campaign in which the missions were made, as of conditions_of. Which one
+        conditions: of the campaign in which the missions were made, as of read_conditions. Which one
             a mission is of follows from columns that are named like the campaign's parameters, or
             `condition` or `block` with its number from 1, or else by order: equally many missions
             of each, one condition after the other, as the exemplar's runner makes them.
@@ -573,9 +572,17 @@ def _vary_together(values: pandas.DataFrame) -> bool:
     return len(set(one)) > 2 and bool(np.ptp(one - other) <= _ABSOLUTE)
 
 
+@plain_arguments
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> pandas.DataFrame:
-    """Read the conditions that a campaign file sweeps, as of conditions_of; none if it sweeps none,
-    or is a scenario.
+    """Read the conditions that a campaign file sweeps: a row for each, with a column for each
+    parameter; none if it sweeps none, or is a scenario.
+
+    Example:
+        real = read_real(["my_real_runs.csv"], read_conditions("my_campaign.yaml"))
+
+    Args:
+        campaign: path of a campaign or scenario file, or name of a shipped one.
+        replacements: as of load_scenario.
 
     Raises:
         InputError: a file cannot be used.
@@ -612,11 +619,22 @@ def published_for(scenario: str | Path) -> Path | None:
     return own if own.is_file() else None
 
 
-def targets_of(
+@plain_arguments
+def read_targets(
     real: Runs, given: Path | None = None
 ) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
-    """Read the shares and limits of the file given, or of NAME.targets.yaml beside each NAME.csv,
-    and name the files.
+    """Read what a faithful simulation must be near, for `validate`.
+
+    Example:
+        real = read_real(["my_real_runs.csv"])
+        shares, limits, files = read_targets(real)
+
+    Args:
+        real: as of read_real.
+        given: the file; left out: NAME.targets.yaml beside each NAME.csv of the real missions.
+
+    Returns:
+        Shares of missions, limits by metric, and the files.
 
     Raises:
         InputError: with file and line: one cannot be read, or is not valid.

@@ -34,7 +34,6 @@ from suave_des.reality.missions import (
     Region,
     Share,
     common_limit_s,
-    count,
 )
 from suave_des.records.metrics import (
     FOUND,
@@ -395,7 +394,7 @@ def compare_shares(
     ]
     rows = []
     for share in (*(each for each in shares if each.manager in managers), *found):
-        counts = [count(share, side) for side in sides]
+        counts = [share.count(side) for side in sides]
         is_known = all(n for _, n in counts)
         if is_known or share not in found:
             rows.append(_share_row(share, *counts))
@@ -441,14 +440,27 @@ def balanced(
     return pandas.concat(kept)
 
 
+@plain_arguments
 def compare_conditions(
     real: pandas.DataFrame,
     simulated: pandas.DataFrame,
     managers: Sequence[str],
     metrics: Sequence[str],
 ) -> pandas.DataFrame:
-    """Compare missions condition by condition: columns of validation_conditions.csv; empty without
-    conditions.
+    """Compare missions condition by condition.
+
+    Example:
+        compared = compare_conditions(real.frame, simulated, ["none", "bt"], ["search_time_s"])
+
+    Args:
+        real: a row for each mission, as of read_real with conditions; likewise simulated, with a
+            column `condition`.
+        managers: those to compare.
+        metrics: columns of runs.csv.
+
+    Returns:
+        A row for each metric, manager and condition: columns of validation_conditions.csv; empty
+        without conditions.
     """
     if CONDITION not in real or CONDITION not in simulated:
         return pandas.DataFrame()

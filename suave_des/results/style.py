@@ -9,10 +9,9 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
-from pathlib import Path
 from typing import Any
 
-import matplotlib
+import matplotlib.style
 from matplotlib.figure import Figure
 
 from suave_des import domain
@@ -110,7 +109,7 @@ class Picture(Figure):
 @contextmanager
 def publication() -> Iterator[None]:
     """Draw figures in the one style; matplotlib's own settings are restored afterwards."""
-    with matplotlib.rc_context(fname=Path(__file__).with_name("figures.mplstyle")):
+    with matplotlib.style.context("suave_des.figures"):
         yield
 
 

@@ -1,5 +1,6 @@
 """The studies in analysis/: a small repetition of each gives what is committed."""
 
+import ast
 import importlib
 import re
 import sys
@@ -29,6 +30,14 @@ KEYS = {
     "period_and_failure": ["period_s", "failure_s", "metric"],
     "design_thresholds": ["margin_m", "metric"],
 }
+
+
+@pytest.mark.parametrize("script", sorted(FOLDER.rglob("*.py")), ids=lambda path: path.stem)
+def test_a_study_imports_nothing_but_the_public_package(script):
+    nodes = list(ast.walk(ast.parse(script.read_text(encoding="utf-8"))))
+    modules = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+    modules |= {name.name for node in nodes if isinstance(node, ast.Import) for name in node.names}
+    assert not [name for name in modules if name.startswith("suave_des.")]
 
 
 @pytest.fixture

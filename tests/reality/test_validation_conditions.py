@@ -12,7 +12,7 @@ from scipy import stats
 
 from suave_des.campaign.variation import Sweep
 from suave_des.errors import InputError
-from suave_des.reality.missions import Share, Targets, conditions_of, count, numbered, read_real
+from suave_des.reality.missions import Share, Targets, conditions_of, numbered, read_real
 from suave_des.reality.validation import (
     balanced,
     compare_conditions,
@@ -369,12 +369,12 @@ LATE, THERE = {"search_time_s": [(120, 130)]}, {"detection_x_m": [(-19.5, -18.5)
     ],
 )
 def test_missions_are_counted_in_regions(share, counted, few):
-    assert count(Share(manager="metacontrol", name="some", **share), few) == counted
+    assert Share(manager="metacontrol", name="some", **share).count(few) == counted
 
 
 def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):
     share = Share(manager="none", name="edge", where={"detection_x_m": [(-17.5, -16.0)]})
-    assert count(share, missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == (1, 2)
+    assert share.count(missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == (1, 2)
 
 
 def test_no_mission_has_no_share(missions):
@@ -385,7 +385,7 @@ def test_no_mission_has_no_share(missions):
         where={"search_time_s": [(0, 1)]},
     )
     few = missions({"none": [(5, 1, 1)]})
-    assert count(share, few) == (0, 0)
+    assert share.count(few) == (0, 0)
     (row,) = compare_shares([share], few.assign(pipeline_found=math.nan), few, ["none"]).to_dict(
         "records"
     )
@@ -401,7 +401,7 @@ def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their
     assert len(with_target) == 4
     for share in with_target:
         low, high = share.target
-        counted, n = count(share, published)
+        counted, n = share.count(published)
         assert low <= counted / n <= high
 
 
