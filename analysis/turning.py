@@ -424,10 +424,10 @@ def conclude(rows: pandas.DataFrame) -> str:
 LEAST_SPREAD_M = 6.0
 FOUND = """\
 The vehicle stays as it is. "Fitted" counts the autopilot's values; the others are ArduSub's, or as shipped. Energy distances are those of
-calibrate.py, medians apart those of median search times over managers and conditions. Thrusters 1 and 3 have failed when `none` searches
+calibrate.py, medians apart those of median search times over managers and conditions; spreads are medians over conditions. Thrusters 1 and 3 have failed when `none` searches
 under conditions 2 and 3, where the real one finds the pipeline at 132 and 215 s; 250 s means never.
 
-- **(a) Heading slew** changes `none` alone. Both failed thrusters left, 2 and 4, turn the vehicle when they push it ahead: the heading loop
+- **(a) Heading slew** changes `none` alone. The thrusters that are left, 2 and 4, turn the vehicle when they push it ahead: the heading loop
   works against each advance until the velocity integral wins, at 5 to 10 m/s2; then the vehicle goes round, up to 3 m past its set-point, and
   back. So it follows at a plausible pace under condition 4, but searches never end under condition 3. Rates without feed-forward, a
   target heading held at the wanted one, a linear angle controller, no rate integral, dead thrusters in place of frozen ones: each was
