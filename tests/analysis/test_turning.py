@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pandas
 import pytest
@@ -19,11 +20,11 @@ def turning(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     return importlib.import_module("turning")
 
 
-def kernel(turning: ModuleType, variant: str) -> dict[str, object]:
+def kernel(turning: ModuleType, variant: str) -> dict[str, Any]:
     """Load a variant's kernel as plain Python."""
     text = (ROOT / turning.KERNEL).read_text(encoding="utf-8")
     text = turning.edited(text, turning.VARIANTS[variant].edits).replace("@compiled\n", "")
-    names: dict[str, object] = {"__name__": "suave_des.vehicle.kernel"}
+    names: dict[str, Any] = {"__name__": "suave_des.vehicle.kernel"}
     exec(compile(text.replace("@record\n", ""), "kernel", "exec"), names)
     return names
 
