@@ -221,7 +221,7 @@ class Metacontrol(ManagingSubsystem):
         measured_before = self._measured_key()
         yield self.system.env.timeout(latency_s)
         by_now = self._plan_by_now(reasoning, measured_before)
-        if self.system.recorded and self.needs_knowledge:
+        if self.system.recorded and self.needs_knowledge and reasoning.plan.decisions:
             self.system.log_state(by_now.inference.state, began_s)
         plan = by_now.plan
         if not was_idle or plan.designs != reasoning.plan.designs:

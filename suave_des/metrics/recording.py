@@ -55,7 +55,7 @@ class Recorder:
         if self.enabled:
             self.events.append(Event(float(self.env.now), source, *texts_of(happening)))
 
-    def log_state(self, state: KnowledgeState, began_s: float | None) -> None:
+    def log_state(self, state: KnowledgeState, began_s: float | None = None) -> None:
         """Keep a state that is reasoned about, if it differs from the one before: of now, or in
         place of the one of an earlier time.
         """
