@@ -62,9 +62,52 @@ def test_the_yaw_rate_for_an_error_is_that_of_the_square_root_controller(turning
     assert demanded(math.radians(20.0)) == pytest.approx(math.radians(math.sqrt(4400.0)))
 
 
+def test_values_are_chosen_among_the_shipped_ones_and_points_within_the_bounds(turning):
+    shipped, *others = turning.sets_of_values(turning.VARIANTS["(c), (d) target waits"])
+    assert shipped == {}
+    assert len(others) == turning.SETS
+    for values in others:
+        assert turning.JERK not in values
+        for path, value in values.items():
+            lower, upper = turning.BOUNDS[path]
+            assert lower <= value <= upper
+
+
+def test_values_of_ardusub_are_held_while_others_are_chosen(turning):
+    sets = turning.sets_of_values(turning.VARIANTS["(b), (c)"])
+    assert {values[turning.GAIN] for values in sets} == {turning.ARDUSUB_GAIN}
+    assert len({values.get(turning.HEADING) for values in sets}) == 1 + turning.SETS
+
+
+BARS = ["means", "medians", "2023", "spread", "spread without losses", "CPU"]
+
+
+@pytest.mark.parametrize(
+    "change, missed",
+    [
+        ({}, []),
+        ({"means_met": 7}, ["means"]),
+        ({"medians_apart_s": 2.25}, ["medians"]),
+        ({"met_2023": 27}, ["2023"]),
+        ({"single_met_2023": 17}, ["2023"]),
+        ({"spread_of_none_m": 5.9}, ["spread"]),
+        ({"spread_without_losses_m": 5.9}, ["spread without losses"]),
+        ({"cpu_ratio": 1.06}, ["CPU"]),
+    ],
+)
+def test_a_bar_is_met_if_it_is_with_the_values_of_either_half(turning, change, missed):
+    good = {"variant": "a", "means_met": 8, "means": 8, "medians_apart_s": 2.0}
+    good |= {"met_2023": 28, "targets_2023": 28, "single_met_2023": 18, "single_2023": 18}
+    good |= {"spread_without_losses_m": 6.0, "spread_of_none_m": 9.0, "cpu_ratio": 1.05}
+    met = turning.bars(pandas.DataFrame([good, good | change])).loc["a"]
+    assert [name for name in BARS if not met[name]] == missed
+
+
 def test_the_committed_conclusion_is_of_the_committed_table(turning):
     rows = pandas.read_csv(FOLDER / "turning" / "turning.csv")
-    assert list(rows["variant"]) == list(turning.VARIANTS)
+    halves = [" ".join(map(str, half)) for half in turning.HALVES]
+    expected = [(name, half) for name in turning.VARIANTS for half in halves]
+    assert list(zip(rows["variant"], rows["chosen_on"], strict=True)) == expected
     assert (FOLDER / "turning" / "conclusion.md").read_text(
         encoding="utf-8"
     ).strip() == turning.conclude(rows).strip()
