@@ -43,6 +43,10 @@ class Ensemble:
 def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
     """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
 
+    Example:
+        ensemble, path, digest = read_ensemble("seams2023")
+        print(len(ensemble.members), "parameter sets of", ensemble.paths)
+
     Args:
         name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key
             paths of the scenario; columns `member` and `loss` are only for information.
