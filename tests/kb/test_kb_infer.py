@@ -238,6 +238,18 @@ sys.exit(5)
         starting.join(10.0)
         assert not starting.is_alive() and not done
 
+    @pytest.mark.parametrize("is_over", [False, True])
+    def test_nobody_waits_for_work_that_comes_after_the_end(self, is_over):
+        thread, late = limit._ReasonerThread(), Future()
+        thread.jobs.put(None)
+        if is_over:
+            thread.start()
+            thread.join(10.0)
+        thread.submit(late, lambda: None)
+        if not is_over:
+            thread.start()
+        assert isinstance(late.exception(10.0), SystemExit)
+
     def test_abandoned_work_no_longer_calls_java_when_java_ends(self):
         # A call that returns at that very moment keeps Python's lock for ever, and the process
         # never ends.

@@ -94,7 +94,7 @@ class TimeLimit:
             self._abandoned = None
         self._wait_for_abandoned()
         future: Future[_Result] = Future()
-        self._thread.jobs.put((future, work))
+        self._thread.submit(future, work)
         try:
             self._wait(future, doing, self.seconds)
         except BaseException:
@@ -176,6 +176,13 @@ class _ReasonerThread(threading.Thread):
         self.jobs: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = (
             queue.SimpleQueue()
         )
+        self._is_over = False
+
+    def submit(self, future: Future[Any], work: Callable[[], Any]) -> None:
+        """Have work done, whose result comes with the future; SystemExit if the thread is over."""
+        self.jobs.put((future, work))
+        if self._is_over:
+            self._refuse()
 
     def run(self) -> None:
         while (job := self.jobs.get()) is not None:
@@ -186,6 +193,16 @@ class _ReasonerThread(threading.Thread):
                 if not future.done():  # it is, where SystemExit comes just then
                     future.set_exception(error)
             del job, future, work  # or the last result would be kept until the next piece of work
+        self._is_over = True
+        self._refuse()
+
+    def _refuse(self) -> None:
+        """End the wait for work that is never done."""
+        with suppress(queue.Empty):
+            while True:
+                job = self.jobs.get_nowait()
+                if job is not None:
+                    job[0].set_exception(SystemExit())
 
 
 def _end_all() -> None:
