@@ -144,6 +144,18 @@ class ReadsLate(EventTriggered):
         return True
 
 
+class SlowInClearWater(EventTriggered):
+    """Takes more than a period, in clear water only."""
+
+    depends_on: ClassVar = EventTriggered.depends_on
+
+    def adapt(self):
+        super().adapt()
+        is_clear = (self.system.measured("water_visibility") or 0.0) >= 3.0
+        yield self.system.env.timeout(3.0 if is_clear else 0.5)
+        return True
+
+
 class TakesTime(EventTriggered):
     """Acts for some time in each region of the visibility and after each report, and is idle
     then.

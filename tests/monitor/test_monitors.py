@@ -22,7 +22,7 @@ from suave_des.monitor.measurements import (
     message_loss,
 )
 from suave_des.monitor.monitors import start_monitors
-from suave_des.monitor.thrusters import Thrusters, thruster_monitor
+from suave_des.monitor.thrusters import Thrusters, failure_loss, thruster_monitor
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Monitor, ThrusterEvent, ThrusterFailureRevision
 from suave_des.world.signals import constant, sinusoid, step
@@ -258,6 +258,34 @@ def test_a_failure_has_no_effect_before_the_revisions_time(effective_from_s, sta
     assert thrusters.vehicle.thrusters[5] == state
     without_effect = [("thruster_monitor", Said("failure_without_effect", "c_thruster_6"))]
     assert logged == (without_effect if state == "works" else [])
+
+
+class FixedDraws:
+    """Draws whose streams give what they are told."""
+
+    def __init__(self, *numbers: float) -> None:
+        self.numbers = iter(numbers)
+
+    def stream(self, name: str) -> "FixedDraws":
+        return self
+
+    def random(self) -> float:
+        return next(self.numbers)
+
+
+def test_a_failure_is_lost_with_its_probability():
+    is_lost = failure_loss(ThrusterFailureRevision(loss_probability=0.13), FixedDraws(0.12, 0.13))
+    assert [is_lost(), is_lost()] == [True, False]
+
+
+def test_a_lost_failure_leaves_the_thruster_at_work():
+    thrusters = noted_thrusters()
+    thrusters.is_lost = iter([True, False]).__next__
+    failure = ThrusterEvent(thruster=6, event="failure", time_s=0.0)
+    thrusters.apply(failure)
+    assert thrusters.vehicle.thrusters[5] == "works"
+    thrusters.apply(failure)
+    assert thrusters.vehicle.thrusters[5] == "frozen"
 
 
 def event(thruster: int, happens: str, time_s: float) -> tuple[ThrusterEvent, float]:

@@ -110,6 +110,12 @@ def test_after_a_call_that_took_a_period_or_more_it_is_called_again():
     assert called == pytest.approx([13.0 + 4.0 * count for count in range(12)])
 
 
+def test_a_hook_during_a_call_that_takes_more_than_a_period_causes_no_second_one_meanwhile():
+    """The call from 33 to 36 s; the failure is reported in its middle."""
+    values = {**steps(2.5, 3.5, 31.5), "thruster_events": failure(33.2)}
+    assert called_s(values, "SlowInClearWater")[0:2] == [33.0, 37.0]
+
+
 def test_it_is_called_at_the_first_of_its_times_after_a_diagnostic():
     assert called_s({**steps(2.5, 2.6, 30.0), "thruster_events": failure(40.0)}) == [41.0]
 

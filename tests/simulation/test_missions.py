@@ -160,6 +160,19 @@ def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator)
     )
 
 
+def test_the_same_failures_are_lost_for_every_manager(simulator):
+    changes = {"thruster_failures": {"effective_from_s": 0.0, "loss_probability": 0.5}}
+    made = simulator(mission={"time_limit_s": 60.0}, revision=changes)
+
+    def lost(manager: str) -> list[bool]:
+        missions = (made.run(manager, run, 1, record=True) for run in range(1, 31))
+        return [bool(events(each, "failure_without_effect")) for each in missions]
+
+    of_none = lost("none")
+    assert 5 < sum(of_none) < 25
+    assert of_none == lost("bt")
+
+
 def test_a_failure_takes_effect_from_the_very_time_on(simulator):
     def without_effect(effective_from_s: float) -> list:
         failures = {"effective_from_s": effective_from_s}
