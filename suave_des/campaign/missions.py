@@ -259,7 +259,7 @@ def reasoner_is_stuck() -> bool:
     return pellet is not None and bool(pellet.is_stuck())
 
 
-Flight = Callable[["Simulator", str, int, int, bool], MissionResult]
+MissionFunction = Callable[["Simulator", str, int, int, bool], MissionResult]
 """Flies a mission: takes its simulator, manager, run, seed and whether it is recorded."""
 
 
@@ -274,7 +274,7 @@ class MissionRunner:
         fly: flies each.
     """
 
-    def __init__(self, campaign: Campaign, fly: Flight = _fly) -> None:
+    def __init__(self, campaign: Campaign, fly: MissionFunction = _fly) -> None:
         self.campaign = campaign
         self._fly = fly
         self._variation = campaign.variation

@@ -124,9 +124,6 @@ class Metacontrol(ManagingSubsystem):
         # functions whose objectives were removed since the last cycle began
         self._cancelled: set[str] = set()
         self._recorded_statuses: frozenset[str] = frozenset()
-        # the last values of which the reasoner's regions were looked up, and these
-        self._measured_before: Hashable = None
-        self._distinguished_before: Hashable = None
         # functions for which the last plan had no design
         self._without_design: frozenset[str] = frozenset()
         # Measured before the first cycle: signals of which function designs expect a value.
@@ -445,13 +442,10 @@ class Metacontrol(ManagingSubsystem):
         """Make the key of the measured values: their regions, or, if the mission is recorded or what
         follows may depend on more, the values.
         """
-        names, values = measured = tuple(self.measurements), tuple(self.measurements.values())
+        measured = self.measurements.values()
         if self.system.recorded or not self._is_cacheable:
-            return measured
-        if measured != self._measured_before:  # most values are asked for several times in a cycle
-            self._measured_before = measured
-            self._distinguished_before = names, self._reasoner.distinguished(values)
-        return self._distinguished_before
+            return tuple(self.measurements), tuple(measured)
+        return tuple(self.measurements), self._reasoner.distinguished(measured)
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""
