@@ -312,6 +312,17 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def printable(name: str) -> str:
+    """Return a name from a file without terminal control characters."""
+    return name if name.isprintable() else repr(name)[1:-1]
+
+
+def listed(parts: Sequence[str], most: int = 6) -> str:
+    """Write the first of several parts, and how many more there are."""
+    more = len(parts) - most
+    return ", ".join(parts[:most]) + (f" and {more} more" if more > 0 else "")
+
+
 def broken_name(name: str, width: int, indent: str = "  ") -> str:
     """Break a long name into lines, the further ones indented, so that it leaves room for what is
     beside it.

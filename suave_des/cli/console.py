@@ -16,6 +16,7 @@ from rich.progress import Progress
 from rich.segment import Segment
 from rich.text import Text
 
+from suave_des.records.metrics import metric_of
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
@@ -63,8 +64,6 @@ class PlainConsole(Console):
 
 _PLAIN_WIDTH = 120
 _NOT_FOUND = "not found: the time limit counts"
-_UNITS = {"_m2": " m2", "_s": " s"}
-"""Of further metrics, by the end of a column."""
 
 
 def output() -> Console:
@@ -134,9 +133,12 @@ def _metrics_rows(
     yield "adaptations", str(metrics.adaptations), ""
     yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():
-        end = next((each for each in _UNITS if column.endswith(each)), "")
-        text = "none"
-        if value is not None:
-            number = f"{value:.2f}" if isinstance(value, float) else str(value)
-            text = f"{number}{_UNITS.get(end, '')}"
-        yield column.removesuffix(end).replace("_", " "), text, ""
+        metric = metric_of(column)
+        assert metric is not None  # a scenario can ask for no others
+        if value is None:
+            text = "none"
+        elif isinstance(value, int):
+            text = f"{value} {metric.unit}"
+        else:
+            text = f"{metric.number(value)} {metric.unit}"
+        yield metric.title, text.strip(), ""

@@ -18,8 +18,6 @@ from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.scenario.modes import Mode
 from suave_des.vehicle.vehicle import Point, Vehicle
 
-"""Called with source, event and detail of something to record."""
-
 
 @dataclass(eq=False)
 class FunctionNode:

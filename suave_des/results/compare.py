@@ -28,7 +28,7 @@ from suave_des.records.missions import Missions, missions_in
 from suave_des.records.runs import CONDITION
 from suave_des.results import statistics
 from suave_des.results.comparison import Comparison, concluded
-from suave_des.results.groups import Group, Groups, grouped, least_and_greatest
+from suave_des.results.groups import Group, Groups, grouped
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table, TableRow
@@ -388,7 +388,7 @@ def _largest(
         is_known = np.isfinite(apart)
         if not apart[is_known].any():
             continue
-        ends = least_and_greatest(apart[is_known], values.runs[is_known])
+        ends = statistics.least_and_greatest(apart[is_known], values.runs[is_known])
         cells = [text for value, run in ends for text in (metric.difference(value), str(run))]
         rows.append((f"{first.name} - {second.name}", *cells))
         size, run = max((abs(value), run) for value, run in ends)

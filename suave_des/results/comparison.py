@@ -15,11 +15,10 @@ from suave_des.errors import number_of
 from suave_des.estimates import Estimate, interval_names
 from suave_des.records.metrics import FOUND, PAPER_METRICS, SEARCH_TIME, Metric
 from suave_des.results.conclusions import conclusion, overall_conclusion
-from suave_des.results.groups import Groups, listed
+from suave_des.results.groups import Groups
 from suave_des.results.statistics import A12, RANK_BISERIAL
-from suave_des.tables import EFFECT, LATEX_NEEDS, Section, Table, TableRow, Written, capital
+from suave_des.tables import EFFECT, LATEX_NEEDS, Section, Table, TableRow, Written, capital, listed
 
-"""A row of a frame by column, None where there is nothing."""
 _NO_TABLE = Table((), ())
 _EFFECTS = {
     RANK_BISERIAL: "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",

@@ -22,7 +22,6 @@ from suave_des.results.statistics import (
 )
 from suave_des.tables import TableRow
 
-"""A difference with the columns of Comparison's frame, but whole estimates."""
 _SHORT = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
 _MOST_SENTENCES = 3
 """Of a metric of which neither more nor less is better, in the conclusion from all differences."""

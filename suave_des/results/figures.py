@@ -38,16 +38,18 @@ from suave_des.results import style
 from suave_des.results.groups import (
     Group,
     Groups,
-    alike_by_source,
     check_swept,
-    first_alike,
     grouped,
-    independent,
-    least_and_greatest,
-    runs_sharing_draw,
 )
 from suave_des.results.horizon import FOUND_BY_HORIZON, horizons_s, to_horizon
+from suave_des.results.independent import (
+    first_run_of_draw,
+    independent,
+    runs_per_draw,
+    runs_per_draw_by_source,
+)
 from suave_des.results.mission import Rules, draw_map, draw_timeline
+from suave_des.results.statistics import least_and_greatest
 from suave_des.results.style import folded, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -244,8 +246,9 @@ def _label(group: Group) -> str:
     """Name a group with its number of missions, and of draws where several missions share one."""
     frame = group.frame
     text = f"n = {len(frame):,}"
-    if group.is_of_missions and group.has_runs and runs_sharing_draw(frame) > 1:
-        draws = len(set(zip(frame["seed"], first_alike(frame), strict=True)))
+    per_draw = runs_per_draw(frame)
+    if group.is_of_missions and group.has_runs and per_draw > 1:
+        draws = len(set(zip(frame["seed"], first_run_of_draw(frame, per_draw), strict=True)))
         text = f"{text} in {number_of(draws, 'draw')}"
     return style.text(folded(f"{group.name} ({text})"))
 
@@ -452,11 +455,11 @@ def _averaged(frame: pandas.DataFrame, counts: Sequence[int], others: Sequence[s
     """Say of how many runs, or draws that runs share, means are, and over what each is averaged."""
     low = min(counts)
     high = max(counts)
-    alike = max(alike_by_source(frame).values(), default=1)
-    what = "run" if alike == 1 else "draw"
+    per_draw = max(runs_per_draw_by_source(frame).values(), default=1)
+    what = "run" if per_draw == 1 else "draw"
     of = f"means of n = {low if low == high else f'{low} to {high}'} {what}{'s' * (high > 1)}"
-    if alike > 1:
-        of += f" of {alike} runs"
+    if per_draw > 1:
+        of += f" of {per_draw} runs"
     return f"{of}, each averaged over {', '.join(map(key_words, others))}" if others else of
 
 
@@ -480,12 +483,12 @@ def _independent_at(
     Raises:
         InputError: none is.
     """
-    alike = alike_by_source(frame)
+    per_draw = runs_per_draw_by_source(frame)
     is_empty = True
     for _, source in frame.groupby("source", sort=False, observed=True):
         for values, whole in source.groupby(list(keys), dropna=False, observed=True):
             for curve, part in whole.groupby("curve", sort=False, observed=True):
-                rows = independent(part, whole, averaged, alike).rows
+                rows = independent(part, whole, averaged, per_draw).rows
                 if len(rows):
                     is_empty = False
                     yield str(curve), values, rows

@@ -495,3 +495,9 @@ def agreement(
             for each in _ALTERNATIVES[1:]
         )
     return float(np.mean(greater.astype(int) - less.astype(int) == sign))
+
+
+def least_and_greatest(values: Sample, runs: Sample) -> list[tuple[float, int]]:
+    """Return the least and the greatest of values, each with its run."""
+    places = int(values.argmin()), int(values.argmax())
+    return [(float(values[place]), int(runs[place])) for place in places]

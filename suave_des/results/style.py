@@ -15,8 +15,7 @@ import matplotlib.style
 from matplotlib.figure import Figure
 
 from suave_des import domain
-from suave_des.results.groups import printable
-from suave_des.tables import broken_name
+from suave_des.tables import broken_name, printable
 
 WIDTH_IN = 7.0
 """Text width of a two-column paper."""
