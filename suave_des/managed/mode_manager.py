@@ -32,7 +32,7 @@ class ModeManager:
         adaptations: changes from one mode to another of functions in use; neither a task's first
             mode of a function nor the fd_unground at its end counts.
         requests: requests for a mode that differs from the previous one.
-        refused: functions and modes whose requests were refused, as there are none such.
+        unknown_requests: functions and modes that were requested and do not exist.
         refusals: requests that were refused by their function.
     """
 
@@ -45,7 +45,7 @@ class ModeManager:
     adaptation_listeners: list[Callable[[str, str, str], None]] = field(default_factory=list)
     adaptations: int = 0
     requests: int = 0
-    refused: dict[tuple[str, str], None] = field(default_factory=dict)
+    unknown_requests: dict[tuple[str, str], None] = field(default_factory=dict)
     refusals: int = 0
     _requested: dict[str, str] = field(default_factory=dict)
     _effect_due_s: dict[str, float] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class ModeManager:
             return True
         chosen = self.table.get(function, mode)
         if chosen is None or function not in self.nodes:
-            self.refused[function, mode] = None
+            self.unknown_requests[function, mode] = None
             self.log("mode_manager", ModeRefused(function, mode))
             return False
         if not self.nodes[function].accepts(chosen):

@@ -304,7 +304,11 @@ def _make_coordinator(
 
 
 def _make_observers(order: Order, around: Surroundings, managed: Managed) -> Observers:
-    """Have metrics and record told what they are made of."""
+    """Have metrics and record told what they are made of.
+
+    They are told of a report before the manager is, as they subscribe first: what the manager does
+    about it at the same time is an answer to it.
+    """
     env, scenario, bus, modes = around.env, order.scenario, around.bus, managed.mode_manager
     altitude_m = scenario.revision.spiral.initial_altitude_m
     reactions = ReactionMeter(

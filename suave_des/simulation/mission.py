@@ -313,8 +313,8 @@ class Mission:
             if surface is not None and surface.surfaced_s is not None:
                 columns.surfacing_time_s = surface.surfaced_s - around.draws.drawn["leak.time_s"]
             further = columns.columns(metrics)
-        refused = self.mode_manager.refused
-        remarks = [str(self.mode_manager.refusal(*request)) for request in refused]
+        unknown = self.mode_manager.unknown_requests
+        remarks = [str(self.mode_manager.refusal(*request)) for request in unknown]
         if not is_built_in(self._order.manager):
             remarks.extend(self._host.remarks())
         recorder = around.recorder
