@@ -18,7 +18,8 @@ from suave_des.tables import Table
 
 
 def scenarios() -> None:
-    """List the shipped scenarios and other inputs."""
+    """List the shipped scenarios, other inputs and managers."""
+    from suave_des.registry import manager_names
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
@@ -38,6 +39,7 @@ def scenarios() -> None:
     for kind, paths in others.items():
         console.print(f"{kind}: {', '.join(path.name for path in paths)}")
     console.print(f"They are in {folder.parent}: copy what you want to change.")
+    console.print(f"Managers: {', '.join(manager_names())}")
 
 
 def schema() -> None:
