@@ -19,7 +19,7 @@ Horn (unions, complements, cardinalities) gets no such shortcut.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
@@ -46,7 +46,7 @@ from suave_des.tables import Table
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the sign that says so and words for it.
-ORDERS: Mapping[str, tuple[str, str]] = {
+ORDERS = {
     "less": ("<", "with the first value less than the second"),
     "equal": ("=", "with equal values"),
     "greater": (">", "with the first value greater than the second"),
@@ -141,9 +141,9 @@ class Coverage(NamedTuple):
         )
 
     def _row(self, rule: str) -> tuple[str, ...]:
-        own = [goal for goal in self.goals if goal.rule == rule]
-        covered = sum(goal in self.covered for goal in own)
-        missing = sum(goal in self.missing for goal in own)
+        own = {goal for goal in self.goals if goal.rule == rule}
+        covered = len(own & self.covered.keys())
+        missing = len(own & self.missing)
         return (
             rule,
             str(self.covered[Goal(rule, -1, FIRES)]),
@@ -163,7 +163,8 @@ class Coverage(NamedTuple):
             yield f"states that would cover the rest: {count} (write them as tests with --write FILE)"
             for state, goals in self.proposed:
                 yield f"  {state}"
-                yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
+                more = f" and {len(goals) - 1} more" if len(goals) > 1 else ""
+                yield f"    {goals[0]}{more}"
 
 
 def measure_coverage(
@@ -187,9 +188,9 @@ def measure_coverage(
     """
     goals = list(_goals(rule for rule in knowledge.base.content.enabled_rules if rule.body))
     covering = _covering(knowledge, goals)
-    covered = Counter(goal for each in dict.fromkeys(situations) for goal in covering(each))
+    covered = Counter(chain.from_iterable(map(covering, dict.fromkeys(situations))))
     left = [goal for goal in goals if goal not in covered]
-    found: dict[frozenset[Goal], KnowledgeState] = {}  # one state for each different set of goals
+    found = dict[frozenset[Goal], KnowledgeState]()  # one state for each different set of goals
     if left:
         covering = _covering(knowledge, left)
         states = States.of(knowledge.base, knowledge.settings, max_failed, knowledge.space)
@@ -197,7 +198,7 @@ def measure_coverage(
             on_count(number, len(states))
             found.setdefault(covering(Situation(state)), state)
     missing = frozenset[Goal]().union(*found)
-    proposed: dict[KnowledgeState, tuple[Goal, ...]] = {}
+    proposed = {}
     waiting = set(missing)
     while waiting:  # each next one covers most of what is left
         reached = max(found, key=lambda each: len(each & waiting))
@@ -249,10 +250,8 @@ class Mutant:
             return "the rule is removed"
         before = list(map(write_atom, self.old.atoms))
         after = list(map(write_atom, self.new.atoms))
-        differing = (
-            at for at, pair in enumerate(zip(before, after, strict=False)) if len({*pair}) > 1
-        )
-        at = next(differing, -1)
+        pairs = enumerate(zip(before, after, strict=False))
+        at = next((at for at, (one, other) in pairs if one != other), -1)
         if len(before) > len(after):
             return f"{before[at]} is left out"
         return f"{before[at]} becomes {after[at]}"
@@ -306,14 +305,14 @@ class _Offered(NamedTuple):
     @classmethod
     def of(cls, base: Ontology) -> _Offered:
         """Collect it from ontologies and enabled rules."""
-        members: dict[str, list[str]] = {}
+        members = defaultdict[str, list[str]](list)
         for individual, name in memberships(base.content.triples):
-            members.setdefault(name, []).append(individual)
-        literals: dict[str, set[Lit]] = {}
-        for rule in base.content.enabled_rules:
-            for at, term in _terms(rule):
+            members[name].append(individual)
+        literals = defaultdict[str, set[Lit]](set)
+        for atom in chain.from_iterable(rule.atoms for rule in base.content.enabled_rules):
+            for term in atom.arguments:
                 if isinstance(term, Lit) and term.datatype not in EXACT:
-                    literals.setdefault(rule.atoms[at.atom].predicate, set()).add(term)
+                    literals[atom.predicate].add(term)
         return cls(tuple(members.values()), literals)
 
 
@@ -345,26 +344,15 @@ def _with_term(rule: Rule, at: _At, term: Term) -> Rule:
     return _with_atom(rule, at.atom, replace(atom, arguments=arguments))
 
 
-def _comparisons(rule: Rule) -> Iterator[tuple[int, Atom, str]]:
-    """The comparisons of a rule: number, atom and sign."""
+_TURNED = {"=": "!=", "!=": "=", "<": ">", ">": "<", "<=": ">=", ">=": "<="}
+_SHIFTED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
+
+
+def _comparisons_changed(rule: Rule, _: _Offered, *, signs: Mapping[str, str]) -> Iterator[Rule]:
     for number, atom in enumerate(rule.body):
-        if atom.predicate in swrl.COMPARISONS:
-            yield number, atom, swrl.COMPARISONS[atom.predicate]
-
-
-def _comparison_turned(rule: Rule, _: _Offered) -> Iterator[Rule]:
-    for number, atom, sign in _comparisons(rule):
-        turned = {"=": "!=", "!=": "="}.get(sign) or swrl.mirrored(sign)
-        yield _with_atom(rule, number, replace(atom, predicate=swrl.COMPARISON_OF[turned]))
-
-
-def _comparison_shifted(rule: Rule, _: _Offered) -> Iterator[Rule]:
-    shifts = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
-    for number, atom, sign in _comparisons(rule):
-        if sign in shifts:
-            yield _with_atom(
-                rule, number, replace(atom, predicate=swrl.COMPARISON_OF[shifts[sign]])
-            )
+        sign = signs.get(swrl.COMPARISONS.get(atom.predicate, ""))
+        if sign is not None:
+            yield _with_atom(rule, number, replace(atom, predicate=swrl.COMPARISON_OF[sign]))
 
 
 def _atom_dropped(rule: Rule, _: _Offered) -> Iterator[Rule]:
@@ -376,14 +364,12 @@ def _atom_dropped(rule: Rule, _: _Offered) -> Iterator[Rule]:
 
 def _variable_exchanged(rule: Rule, _: _Offered) -> Iterator[Rule]:
     """By the next one of the rule that stands for the same kind, an individual or a value."""
-    is_value: dict[Term, bool] = {}
-    for at, term in _terms(rule):
-        if isinstance(term, Variable):
-            takes_value = rule.atoms[at.atom].takes_value(at.argument)
-            is_value[term] = is_value.get(term, False) or takes_value
-    for at, term in _terms(rule):
-        if isinstance(term, Variable) and at.atom < len(rule.body):
-            alike = [each for each in is_value if is_value[each] == is_value[term]]
+    variables = [(at, term) for at, term in _terms(rule) if isinstance(term, Variable)]
+    values = {term for at, term in variables if rule.atoms[at.atom].takes_value(at.argument)}
+    every = dict.fromkeys(term for _, term in variables)
+    for at, term in variables:
+        if at.atom < len(rule.body):
+            alike = [each for each in every if (each in values) == (term in values)]
             yield _with_term(rule, at, _next(term, alike))
 
 
@@ -410,12 +396,10 @@ def _threshold_moved(rule: Rule, _: _Offered) -> Iterator[Rule]:
 def _literals_exchanged(rule: Rule, offered: _Offered, *, in_head: bool) -> Iterator[Rule]:
     """Exchange the literals of head or body by others that rules mention of the same property."""
     for at, term in _terms(rule):
-        is_in_head = at.atom >= len(rule.body)
-        if is_in_head != in_head or rule.atoms[at.atom].kind != "data":
-            continue
-        if isinstance(term, Lit) and term.datatype not in EXACT:
-            known = offered.literals[rule.atoms[at.atom].predicate]
-            for other in _others(term, known):
+        atom = rule.atoms[at.atom]
+        is_wanted = atom.kind == "data" and (at.atom >= len(rule.body)) == in_head
+        if is_wanted and isinstance(term, Lit) and term.datatype not in EXACT:
+            for other in _others(term, offered.literals[atom.predicate]):
                 yield _with_term(rule, at, other)
 
 
@@ -428,8 +412,8 @@ def _others(value: Lit, known: Iterable[Lit]) -> list[Lit]:
 
 #: What each kind of change makes of a rule; None: the rule is removed.
 MUTATION_OPERATORS: Mapping[str, Callable[[Rule, _Offered], Iterable[Rule | None]]] = {
-    "comparison turned": _comparison_turned,
-    "comparison shifted": _comparison_shifted,
+    "comparison turned": partial(_comparisons_changed, signs=_TURNED),
+    "comparison shifted": partial(_comparisons_changed, signs=_SHIFTED),
     "atom dropped": _atom_dropped,
     "variable exchanged": _variable_exchanged,
     "conclusion changed": partial(_literals_exchanged, in_head=True),
@@ -540,10 +524,10 @@ def mutate(
         InputError: there would be too many states.
         KnowledgeError: the reasoner takes too long.
     """
-    results: dict[Mutant, MutantResult] = {}
+    results = {}
     quick_first = sorted(tests, key=lambda test: len(test.situations))
     every = _Mutants(knowledge, mutants)
-    left: list[Mutant] = []
+    left = []
     for mutant in mutants:
         killer = every.killer(mutant, quick_first)
         if killer is None:
@@ -587,7 +571,7 @@ def mutation_table(results: Sequence[MutantResult]) -> Table:
         f"{total[EQUIVALENT]} equivalent"
     )
     rows = []
-    for operator in dict.fromkeys(each.mutant.operator for each in results):
+    for operator in dict.fromkeys(operator for operator, _ in counts):
         rows.append((operator, *(str(counts[operator, kind]) for kind in kinds)))
     return Table(("operator", *kinds), rows, title)
 

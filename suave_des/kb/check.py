@@ -27,7 +27,6 @@ from suave_des.errors import (
 )
 from suave_des.kb.space import PolicySpace, spread
 from suave_des.kb.states import ManagingSettings
-from suave_des.knowledge import rdf
 from suave_des.knowledge.checks import (
     Subject,
     check_revision,
@@ -38,8 +37,8 @@ from suave_des.knowledge.checks import (
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, place_of
 from suave_des.knowledge.pellet import TimeLimit
-from suave_des.knowledge.pellet.in_process import pattern_problem
-from suave_des.knowledge.rdf import HAS_VALUE, Lit, local_name
+from suave_des.knowledge.pellet.in_process import ignored_axioms, pattern_problem
+from suave_des.knowledge.rdf import HAS_VALUE, SWRLB, Lit, local_name
 from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.resolver import collect
 from suave_des.knowledge.rules.files import about_rule
@@ -85,9 +84,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     return ordered([*findings, *_wrong_patterns(base), *_ask_pellet(subject, base, findings)])
 
 
-_PATTERN = {
-    rdf.SWRLB + name: place for name, place in (("matches", 1), ("replace", 2), ("tokenize", 2))
-}
+#: Which argument of a built-in is a pattern.
+_PATTERN = {SWRLB + "matches": 1, SWRLB + "replace": 2, SWRLB + "tokenize": 2}
 
 
 def _wrong_patterns(base: Ontology) -> Iterator[Finding]:
@@ -95,10 +93,10 @@ def _wrong_patterns(base: Ontology) -> Iterator[Finding]:
     for rule in base.content.enabled_rules:
         for atom in rule.body:
             number = _PATTERN.get(atom.predicate, len(atom.arguments))
-            pattern = next(iter(atom.arguments[number : number + 1]), None)
-            if isinstance(pattern, Lit) and (problem := pattern_problem(pattern.text)):
-                words = f"{pattern.text!r} is not a pattern, and matches nothing: {problem}"
-                yield about_rule(rule, words, atom.place(number), None, Level.WARN)
+            for pattern in atom.arguments[number : number + 1]:
+                if isinstance(pattern, Lit) and (problem := pattern_problem(pattern.text)):
+                    words = f"{pattern.text!r} is not a pattern, and matches nothing: {problem}"
+                    yield about_rule(rule, words, atom.place(number), None, Level.WARN)
 
 
 def _ask_pellet(subject: Subject, base: Ontology, before: Sequence[Finding]) -> Iterator[Finding]:
@@ -135,8 +133,6 @@ def ignored_by_pellet(base: Ontology) -> Iterator[Finding]:
     kept = SharedEntries(private_cache("findings"), f"{base.content_hash[:32]}{program[:32]}")
     said = next((found for _, found in kept.read()), None)
     if said is None:
-        from suave_des.knowledge.pellet.in_process import ignored_axioms
-
         said = ignored_axioms(base)
         kept.add("ignored", said)
     for axiom in said:

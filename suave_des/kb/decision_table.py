@@ -7,21 +7,23 @@ A file may begin with lines of YAML, each after a `#`: the settings. Form: docs/
 from __future__ import annotations
 
 import csv
-import itertools
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, lru_cache
+from itertools import chain, product, takewhile
 from math import isfinite, prod
+from operator import itemgetter
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, did_you_mean, line_error, located, shown
 from suave_des.files import decode, read_bytes
-from suave_des.kb.scale import Scale, TestedRegion, is_in, parse_region
+from suave_des.kb.scale import Scale, TestedRegion, parse_region
 from suave_des.kb.situations import INCONSISTENT, Outcome, Situation
-from suave_des.kb.space import PolicySpace, Reports
+from suave_des.kb.space import PolicySpace, Reports, present
 from suave_des.kb.states import LASTING
 from suave_des.knowledge.reasoner import Regions
 from suave_des.knowledge.state import (
@@ -43,13 +45,13 @@ from suave_des.scenario.models import DelayDistribution, Period, Strict
 from suave_des.scenario.yamlfile import Layer, parse_yaml, validated
 
 _NOW, _THEN, _COMPONENTS, _AGAIN = "_now", "_then", "components", "again"
-_ANY: Final = "any"
-_NO_RESULT: Final = ("states", "statuses", "marks", "problem")
+_ANY = "any"
+_NO_RESULT = ("states", "statuses", "marks", "problem")
 """Columns of a policy that decide nothing."""
-_LIMIT_BYTES: Final = 100_000_000
-_MOST_CELLS: Final = 2_000_000
-_MEASURED: Final[TestedRegion] = ((">", Decimal("-Infinity")),)
-SHIPPED: Final = "scenarios/managers"
+_LIMIT_BYTES = 100_000_000
+_MOST_CELLS = 2_000_000
+_MEASURED: TestedRegion = ((">", Decimal("-Infinity")),)
+SHIPPED = "scenarios/managers"
 """Kind of file of the shipped tables."""
 
 
@@ -90,16 +92,11 @@ class _Rule(NamedTuple):
 _Asked = tuple[Reports | None, str | None]
 
 
-class _Cell(NamedTuple):
-    """What is decided at some places of measured values, by what is asked.
-
-    Attributes:
-        rules: that differ in other functions' designs.
-        alike: what rules decide alike for each of these, and so where no row asks for them.
-    """
-
-    rules: dict[_Asked, list[_Rule]]
-    alike: dict[_Asked, _Rule]
+#: What is decided at some places of measured values: by what is asked, rules that differ in other
+# functions' designs.
+_Cell = dict[_Asked, list[_Rule]]
+#: By function and places.
+_Cells = dict[str, dict[tuple[int, ...], _Cell]]
 
 
 class _Row(NamedTuple):
@@ -128,7 +125,7 @@ class DecisionTable:
     counts_reports: bool
     components: Mapping[str, Mapping[str, int]]
     designs: Mapping[str, Mapping[str, int]]
-    _cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]
+    _cells: _Cells
 
     def reports(self, components: Iterable[tuple[str, str]]) -> Reports:
         """What components report, with the first of each group in the place of any other."""
@@ -137,8 +134,8 @@ class DecisionTable:
     def related(self, function: str) -> tuple[str, ...]:
         """Functions on whose designs a function's decisions depend: itself, and maybe others."""
         cells = self._cells.get(function, {}).values()
-        rules = itertools.chain.from_iterable(cell.rules.values() for cell in cells)
-        others = set[str]().union(*(rule.others for rule in itertools.chain.from_iterable(rules)))
+        rules = chain.from_iterable(cell.values() for cell in cells)
+        others = set[str]().union(*(rule.others for rule in chain.from_iterable(rules)))
         return function, *sorted(others - {function})
 
     def rule(self, function: str, state: KnowledgeState) -> tuple[str, int]:
@@ -164,7 +161,8 @@ class DecisionTable:
         reports = "; ".join(f"{name}={status}" for name, status in self.reports(state.components))
         words += [f"components {reports or 'without a report'}"] if self.counts_reports else []
         nows = (
-            f"{name} now {_now(state, name) or '(not needed)'}" for name in self.related(function)
+            f"{name} now {present(state, name) or '(not needed)'}"
+            for name in self.related(function)
         )
         beside = sorted(self._beside(function, state, places))
         return InputError(
@@ -176,18 +174,38 @@ class DecisionTable:
         )
 
     def _found(self, function: str, state: KnowledgeState, places: Sequence[int]) -> _Rule | None:
-        cell = self._cells[function].get(tuple(places), _NOTHING)
+        cell = self._cells[function].get(tuple(places), {})
         reports = self.reports(state.components)
-        now = _now(state, function)
-        wider = list(itertools.product((reports, None), (now, None)))
-        for rule in itertools.chain.from_iterable(cell.rules.get(asked, ()) for asked in wider):
-            if all(_now(state, name) == design for name, design in rule.others.items()):
+        wider = product((reports, None), (present(state, function), None))
+        found = [cell[asked] for asked in wider if asked in cell]
+        for rule in chain.from_iterable(found):
+            if all(present(state, name) == design for name, design in rule.others.items()):
                 return rule
-        return next((cell.alike[asked] for asked in wider if asked in cell.alike), None)
+        return next((rules[0] for rules in found if self._are_alike(function, rules)), None)
+
+    def _are_alike(self, function: str, rules: Sequence[_Rule]) -> bool:
+        """Return whether rules decide alike for every design of the other functions that they ask
+        for.
+
+        kb policy lists no state before a task, nor those with several functions besides the lasting
+        ones: there, too, what they decide alike holds.
+        """
+        if len({rule.then for rule in rules}) > 1:
+            return False
+        needed = {frozenset(filter(itemgetter(1), rule.others.items())) for rule in rules}
+        counts = Counter(frozenset(dict(designs)) for designs in needed)
+        never = set[str]().union(*(rule.others for rule in rules)).difference(*counts)
+        if never and not never.union([function]).isdisjoint(LASTING):
+            return False
+        return all(number == self._choices(names) for names, number in counts.items())
+
+    def _choices(self, functions: Iterable[str]) -> int:
+        """Count the combinations of designs of functions, or none, that are in rows."""
+        return prod(1 + len(self.designs.get(name, ())) for name in functions)
 
     def _beside(self, function: str, state: KnowledgeState, places: Sequence[int]) -> Iterator[int]:
         """Lines that decide in the ranges next to a place."""
-        for number, step in itertools.product(range(len(places)), (-1, 1)):
+        for number, step in product(range(len(places)), (-1, 1)):
             other = list(places)
             other[number] += step
             if (found := self._found(function, state, other)) is not None:
@@ -267,7 +285,7 @@ class DecisionTable:
         named = self.components.keys()
         groups = [each for each in self.settings.interchangeable if set(each) & named]
         alone = sorted(set(named).difference(*groups))
-        statuses = set(itertools.chain.from_iterable(self.components.values()))
+        statuses = set(chain.from_iterable(self.components.values()))
         return PolicySpace(
             tuple(sorted(self.attributes)),
             self._regions.thresholds,
@@ -275,16 +293,6 @@ class DecisionTable:
             tuple(sorted(statuses)),
             tuple(sorted(self._cells)),
         )
-
-
-_NOTHING: Final = _Cell({}, {})
-
-
-def _now(state: KnowledgeState, function: str) -> str:
-    """The design in use, as tables have it: "" for a function without objective."""
-    if all(each.function != function for each in state.objectives):
-        return ""
-    return state.grounded(function) or NO_GROUNDING
 
 
 def _representatives(
@@ -325,7 +333,7 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     """
     text = decode(path, read_bytes(path, _LIMIT_BYTES))
     lines = text.splitlines(keepends=True)
-    head = list(itertools.takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
+    head = list(takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
     layer = _layer(path, head)
     layer.data.update(changes or {})
     settings = validated(layer, TableSettings)
@@ -339,17 +347,15 @@ def read_table(path: Path, changes: Mapping[str, object] | None = None) -> Decis
     scales = _scales(header, read)
     components = _lines((*each, row.line) for row in read for each in row.reports or ())
     _check_settings(layer, settings, header, components)
-    designs = _designs(read)
     cells = _cells(path, read, list(scales.values()))
     _check_overlaps(path, cells)
-    _note_alike(cells, designs)
     return DecisionTable(
         path,
         settings,
         scales,
         any(row.reports is not None for row in read),
         components,
-        designs,
+        _designs(read),
         cells,
     )
 
@@ -358,8 +364,8 @@ def _scales(header: Iterable[str], rows: Sequence[_Row]) -> dict[str, Scale]:
     """The places of each attribute: between and at the numbers of its column."""
     found = {}
     for number, name in enumerate(_attributes(header)):
-        regions = itertools.chain.from_iterable(row.regions[number] for row in rows)
-        ends = {end for _, end in itertools.chain.from_iterable(regions)}
+        regions = chain.from_iterable(row.regions[number] for row in rows)
+        ends = {end for _, end in chain.from_iterable(regions)}
         found[name] = Scale(tuple(sorted(filter(Decimal.is_finite, ends))))
     return found
 
@@ -392,7 +398,7 @@ def _check_settings(
         )
     known = [*THRUSTER_NAMES, HULL, *components]
     groups = settings.interchangeable
-    for name in (members := list(itertools.chain.from_iterable(groups))):
+    for name in (members := list(chain.from_iterable(groups))):
         place = ("interchangeable",)
         if name not in known:
             problem = f"there is no component {shown(name)}"
@@ -523,75 +529,29 @@ def _lines(named: Iterable[tuple[str, str, int]]) -> dict[str, dict[str, int]]:
     return found
 
 
-def _cells(
-    path: Path, rows: Iterable[_Row], scales: Sequence[Scale]
-) -> dict[str, dict[tuple[int, ...], _Cell]]:
-    found: dict[str, dict[tuple[int, ...], _Cell]] = {}
+def _cells(path: Path, rows: Iterable[_Row], scales: Sequence[Scale]) -> _Cells:
+    found: _Cells = {}
     number = 0
     for row in rows:
         inside = [_places(*each) for each in zip(row.regions, scales, strict=True)]
-        for places, (function, then) in itertools.product(
-            itertools.product(*inside), row.then.items()
-        ):
+        for places, (function, then) in product(product(*inside), row.then.items()):
             number += 1
             if number > _MOST_CELLS:
                 remedy = "compare measured values with fewer numbers"
                 raise line_error(path, row.line, f"more than {_MOST_CELLS:,} cells", remedy)
             others = {name: now for name, now in row.now.items() if name != function}
-            cell = found.setdefault(function, {}).setdefault(places, _Cell({}, {}))
+            cell = found.setdefault(function, {}).setdefault(places, {})
             asked = row.reports, row.now.get(function)
-            cell.rules.setdefault(asked, []).append(_Rule(others, then, row.line))
+            cell.setdefault(asked, []).append(_Rule(others, then, row.line))
     return found
 
 
-def _note_alike(
-    cells: Mapping[str, Mapping[tuple[int, ...], _Cell]], designs: Mapping[str, Collection[str]]
-) -> None:
-    """Note in cells what their rules decide alike."""
-    for function, places in cells.items():
-        for cell in places.values():
-            for asked, rules in cell.rules.items():
-                if _are_alike(function, rules, designs):
-                    cell.alike[asked] = rules[0]
-
-
-def _are_alike(
-    function: str, rules: Sequence[_Rule], designs: Mapping[str, Collection[str]]
-) -> bool:
-    """Return whether rules decide alike for every design of the other functions that they ask for.
-
-    kb policy lists no state before a task, nor those with several functions besides the lasting
-    ones: there, too, what they decide alike holds.
-    """
-    if len({rule.then for rule in rules}) > 1:
-        return False
-    by_needed: dict[frozenset[str], set[tuple[tuple[str, str], ...]]] = {}
-    never = set[str]()
-    for rule in rules:
-        never.update(rule.others)
-        needed = {name: now for name, now in sorted(rule.others.items()) if now}
-        by_needed.setdefault(frozenset(needed), set()).add(tuple(needed.items()))
-    never.difference_update(*by_needed)
-    if never and not never.union([function]).isdisjoint(LASTING):
-        return False
-    return all(len(found) == _choices(needed, designs) for needed, found in by_needed.items())
-
-
-def _choices(functions: Iterable[str], designs: Mapping[str, Collection[str]]) -> int:
-    """Count the combinations of designs of functions, or none, that a table has."""
-    return prod(1 + len(designs.get(name, ())) for name in functions)
-
-
 @lru_cache(maxsize=4096)
-def _places(regions: Sequence[TestedRegion], scale: Scale) -> tuple[int, ...]:
-    def is_inside(place: int) -> bool:
-        value = scale.value(place)
-        return not regions or any(is_in(region, value) for region in regions)
-
-    return tuple(filter(is_inside, range(len(scale))))
+def _places(regions: Sequence[TestedRegion], scale: Scale) -> Sequence[int]:
+    return scale.places_in(*regions) if regions else range(len(scale))
 
 
-def _check_overlaps(path: Path, cells: Mapping[str, Mapping[tuple[int, ...], _Cell]]) -> None:
+def _check_overlaps(path: Path, cells: _Cells) -> None:
     """Check that no two rows decide one state differently."""
     for function, places in cells.items():
         for cell in places.values():
@@ -607,12 +567,12 @@ def _check_overlaps(path: Path, cells: Mapping[str, Mapping[tuple[int, ...], _Ce
 
 def _contradicting(cell: _Cell) -> Iterator[tuple[_Rule, _Rule]]:
     """Pairs of rules that decide a state that they have in common differently."""
-    for one, rules in cell.rules.items():
-        wider = set(itertools.product({one[0], None}, {one[1], None}))
+    for one, rules in cell.items():
+        wider = set(product({one[0], None}, {one[1], None}))
         if None in one:  # (any, design) and (reports, any) have states in common, too
-            wider |= {each for each in cell.rules if _agree(one, each)}
-        for rule, other in itertools.product(
-            rules, itertools.chain.from_iterable(cell.rules.get(each, ()) for each in wider)
+            wider |= {each for each in cell if _agree(one, each)}
+        for rule, other in product(
+            rules, chain.from_iterable(cell.get(each, ()) for each in wider)
         ):
             if rule.then != other.then and all(
                 other.others.get(name, now) == now for name, now in rule.others.items()

@@ -7,10 +7,10 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import rdflib
 from rdflib.term import Node
@@ -45,11 +45,11 @@ if TYPE_CHECKING:
     import pandas
 
 #: Metrics of missions that are always compared; others are where they differ.
-COMPARED_METRICS: Final = (SEARCH_TIME, DISTANCE)
-_MANAGER: Final = "metacontrol"
+COMPARED_METRICS = (SEARCH_TIME, DISTANCE)
+_MANAGER = "metacontrol"
 #: Numbers of missions that are listed.
-_MOST_RUNS: Final = 10
-_PLACES: Final = ("initial_", "detection_")
+_MOST_RUNS = 10
+_PLACES = ("initial_", "detection_")
 
 
 def compare_axioms(one: Ontology, other: Ontology) -> tuple[list[str], list[str]]:
@@ -141,13 +141,13 @@ class PolicyDifference:
         yield from (
             f"{reason}: each range was tried with one value only" for reason in self.no_proof
         )
-        groups: dict[str, list[int]] = {}
+        groups = defaultdict(list)
         for number, case in enumerate(self.cells.to_dict("records")):
             for name in self.functions:
                 one, other = case[f"{name}_then_a"], case[f"{name}_then_b"]
                 if one != other:
                     heading = f"{name}, now {case[f'{name}_now']}: A {one}, B {other}"
-                    groups.setdefault(heading, []).append(number)
+                    groups[heading].append(number)
         for heading, numbers in groups.items():
             yield heading
             cells = self.cells.iloc[numbers]
@@ -190,28 +190,33 @@ def _boxes(cells: pandas.DataFrame, names: Sequence[str]) -> dict[_Box, int]:
 
 
 def compare_decisions(
-    states: States, one: Decide, other: Decide, no_proof: tuple[str, ...], *, infer: bool = True
+    states: States, one: Decide, other: Decide, bases: Iterable[Ontology], *, infer: bool = True
 ) -> PolicyDifference:
     """Compare what two knowledge bases decide in all of some states; see PolicyDifference.
 
     Args:
+        bases: in whose rules reasons are looked for to do more than compare.
         infer: whether both infer statuses, which are compared then.
     """
-    decided, reported = [], 0
+    differing = []
+    of_one = []
+    of_other = []
+    reported = 0
     for situation, before, after in compare(one, other, map(Situation, states)):
-        if any(
-            before.choice(each.function) != after.choice(each.function)
-            for each in situation.state.objectives
-        ):
-            decided.append((situation.state, before, after))
+        state = situation.state
+        if any(before.choice(name) != after.choice(name) for name, *_ in state.objectives):
+            differing.append(state)
+            of_one.append(before)
+            of_other.append(after)
         elif infer and before.statuses != after.statuses:
-            reported += states.reports[situation.state.components]
-    differing = [state for state, _, _ in decided]
+            reported += states.reports[state.components]
     cells = states.frame(differing)
-    add_decisions(cells, states, [before for _, before, _ in decided], "_a")
-    add_decisions(cells, states, [after for _, _, after in decided], "_b")
+    add_decisions(cells, states, of_one, "_a")
+    add_decisions(cells, states, of_other, "_b")
     cells["state"] = differing
     compared = len(states.measured) * len(states.tasks) * sum(states.reports.values())
+    reasons = chain.from_iterable(regions_of(base).reasons for base in bases)
+    no_proof = tuple(dict.fromkeys(reasons))
     return PolicyDifference(compared, cells, reported, states.space, states.functions, no_proof)
 
 
@@ -299,10 +304,9 @@ def firing_states(
 
     loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
     bases = list(map(open_base, loaded))
-    rules = [{rule.text: rule.body for rule in base.content.enabled_rules} for base in bases]
-    probes = Probes(
-        bases[1], limit, [(rules[0] | rules[1])[text] for text in rules[0].keys() ^ rules[1].keys()]
-    )
+    ours, theirs = ({rule.text: rule.body for rule in base.content.enabled_rules} for base in bases)
+    differing = [(ours | theirs)[text] for text in ours.keys() ^ theirs.keys()]
+    probes = Probes(bases[1], limit, differing)
     regions = regions_of(bases[1])
     missions = (run_mission(loaded[0], _MANAGER, run, seed) for run in range(1, runs + 1))
     alike = defaultdict[Hashable, list[KnowledgeState]](list)
@@ -319,11 +323,10 @@ def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifferen
     from suave_des.results.statistics import mean_interval
 
     differs = before.ne(after) & ~(before.isna() & after.isna())
-    others = [str(name) for name in before.select_dtypes("number") if differs[name].any()]
+    numbers = map(str, before.select_dtypes("number"))
+    others = [each for each in numbers if differs[each].any() and not each.startswith(_PLACES)]
     metrics = []
-    for name in dict.fromkeys(
-        (*COMPARED_METRICS, *(each for each in others if not each.startswith(_PLACES)))
-    ):
+    for name in dict.fromkeys((*COMPARED_METRICS, *others)):
         pairs = pandas.DataFrame({"a": before[name], "b": after[name]}, dtype=float).dropna()
         metric = metric_of(name) or Metric(name, name.replace("_", " "))
         found = mean_interval((pairs["b"] - pairs["a"]).to_numpy())

@@ -8,16 +8,32 @@ more to say, every value counts, as it is.
 
 from __future__ import annotations
 
-import itertools
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator
 from decimal import Decimal
+from itertools import chain, combinations
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge import rdf
 from suave_des.knowledge.checks import attributes_asked
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rdf import (
+    FUNCTIONAL,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    OWL,
+    RDF_TYPE,
+    RDFS,
+    SUBCLASS,
+    TOMASYS,
+    Lit,
+    Triple,
+    links,
+    members,
+    reached,
+    subjects,
+    terms,
+)
 from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import (
     COMPARISONS,
@@ -31,14 +47,14 @@ from suave_des.knowledge.rules import (
 )
 from suave_des.knowledge.state import exact
 
-_CARRIED = frozenset({rdf.IS_QA_TYPE, rdf.HAS_VALUE})
-_OF_VALUES = _CARRIED | {rdf.HAS_QA_VALUE, rdf.TOMASYS + "hasQAestimation"}
+_CARRIED = frozenset({IS_QA_TYPE, HAS_VALUE})
+_OF_VALUES = _CARRIED | {HAS_QA_VALUE, TOMASYS + "hasQAestimation"}
 #: What a schema may say of these properties without relating values of one attribute to those of
 # another.
-_HARMLESS = {
-    (rdf.RDF_TYPE, kind) for kind in rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty")
-} | {(name, None) for name in rdf.terms(rdf.RDFS, "domain range")}
-_FUNCTIONAL = frozenset((name, rdf.RDF_TYPE, rdf.FUNCTIONAL) for name in _CARRIED)
+_HARMLESS = {(RDF_TYPE, kind) for kind in terms(OWL, "ObjectProperty DatatypeProperty")} | {
+    (name, None) for name in terms(RDFS, "domain range")
+}
+_FUNCTIONAL = frozenset((name, RDF_TYPE, FUNCTIONAL) for name in _CARRIED)
 
 
 def has_effect(base: Ontology, attribute: str, function: str | None = None) -> bool:
@@ -55,7 +71,7 @@ def has_effect(base: Ontology, attribute: str, function: str | None = None) -> b
     designs: Iterable[str] = model.estimated
     if function is not None:
         designs = base.designs(function)
-    elif rdf.subjects(base.content.triples, rdf.IS_QA_TYPE, iri):  # the ontologies have a value
+    elif subjects(base.content.triples, IS_QA_TYPE, iri):  # the ontologies have a value
         return True
     if any(attribute in model.estimated[name] for name in designs):
         return True
@@ -80,14 +96,14 @@ def _classes_of_measured(base: Ontology) -> set[str]:
     say, and all above.
     """
     triples = base.content.triples
-    domains = {kind for name, kind in rdf.links(triples, rdf.RDFS + "domain") if name in _CARRIED}
-    above = rdf.links(triples, rdf.SUBCLASS, rdf.OWL + "equivalentClass")
-    return rdf.reached({rdf.TOMASYS + "QAvalue", rdf.OWL + "Thing", *domains}, above)
+    domains = {kind for name, kind in links(triples, RDFS + "domain") if name in _CARRIED}
+    above = links(triples, SUBCLASS, OWL + "equivalentClass")
+    return reached({TOMASYS + "QAvalue", OWL + "Thing", *domains}, above)
 
 
 def has_expressions(base: Ontology) -> bool:
     """Whether the ontologies have class expressions."""
-    return bool(rdf.members(base.content.structure, rdf.terms(rdf.OWL, "Class Restriction")))
+    return bool(members(base.content.structure, terms(OWL, "Class Restriction")))
 
 
 def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:
@@ -96,8 +112,8 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
     """
     if Named(measured) in _terms_of(rule) or rule.speaks_of_identity:
         return True
-    subjects = {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}
-    return any(_can_be(term, rule, attribute, classes) for term in subjects)
+    asked = {atom.arguments[0] for atom in rule.body if atom.kind in FACT_KINDS}
+    return any(_can_be(term, rule, attribute, classes) for term in asked)
 
 
 def _can_be(term: Term, rule: Rule, attribute: str, classes: set[str]) -> bool:
@@ -115,34 +131,31 @@ def _could_hold(atom: Atom, attribute: str, classes: set[str]) -> bool:
     """Whether an atom can hold of what carries a measured value."""
     if atom.kind == "class":
         return atom.predicate in classes
-    if atom.predicate == rdf.IS_QA_TYPE:
+    if atom.predicate == IS_QA_TYPE:
         return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(attribute)
-    return atom.predicate == rdf.HAS_VALUE
+    return atom.predicate == HAS_VALUE
 
 
 def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
     """Group the components that can be exchanged: doing so maps ontologies and rules onto
     themselves.
     """
-    groups: dict[str, list[str]] = {}
+    groups = defaultdict[str, list[str]](list)
     for name in base.model.components:
         first = next((each for each in groups if _exchangeable(base, each, name)), name)
-        groups.setdefault(first, []).append(name)
+        groups[first].append(name)
     return tuple(map(tuple, groups.values()))
 
 
 def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     known_as = base.model.components
-    swap: dict[str | Lit, str] = {
-        known_as[one]: known_as[other],
-        known_as[other]: known_as[one],
-    }
+    swap: dict[str | Lit, str] = {known_as[one]: known_as[other], known_as[other]: known_as[one]}
     content = base.content
     if not _terms_of(*content.enabled_rules).isdisjoint(map(Named, swap.values())):
         return False
-    if not swap.keys().isdisjoint(itertools.chain.from_iterable(content.structure)):
+    if not swap.keys().isdisjoint(chain.from_iterable(content.structure)):
         return False
-    known = itertools.chain(content.triples, *(base.model.own[iri] for iri in swap.values()))
+    known = chain(content.triples, *(base.model.own[iri] for iri in swap.values()))
     own = {triple for triple in known if triple[0] in swap or triple[2] in swap}
     return own == {
         (swap.get(subject, subject), name, swap.get(value, value)) for subject, name, value in own
@@ -164,7 +177,7 @@ def regions_by_attribute(base: Ontology, attributes: tuple[str, ...]) -> dict[st
         return None
     measured = set(map(known.__getitem__, attributes))
     numbers = {iri: set(_values(base, iri)) for iri in measured}
-    for one, other in itertools.chain.from_iterable(map(_compared, base.content.enabled_rules)):
+    for one, other in chain.from_iterable(map(_compared, base.content.enabled_rules)):
         concerned = _concerned(one, other, measured)
         if concerned is None:
             return None
@@ -195,8 +208,8 @@ def _numbers_of(base: Ontology, one: str | Decimal) -> set[Decimal]:
 def _values(base: Ontology, attribute: str) -> set[Decimal]:
     """The numbers that the ontologies give of a quality attribute."""
     triples = base.content.triples
-    typed = rdf.subjects(triples, rdf.IS_QA_TYPE, attribute)
-    values = (o for s, p, o in triples if p == rdf.HAS_VALUE and s in typed)
+    typed = subjects(triples, IS_QA_TYPE, attribute)
+    values = (o for s, p, o in triples if p == HAS_VALUE and s in typed)
     return {Decimal(value.text.strip()) for value in values if isinstance(value, Lit)}
 
 
@@ -205,20 +218,17 @@ def _compared(rule: Rule) -> Iterator[tuple[_Side, _Side]]:
     what it reads.
     """
     types = {atom.arguments[0]: attribute for atom, attribute in attributes_asked(rule)}
-    read: dict[Term, list[_Side]] = {}
+    read = defaultdict[Term, list[_Side]](list)
     for atom in rule.body:
         if atom.kind == "data":
-            here = types.get(atom.arguments[0], _ANY) if atom.predicate == rdf.HAS_VALUE else _ANY
-            read.setdefault(atom.arguments[1], []).append(frozenset({here}))
+            here = types.get(atom.arguments[0], _ANY) if atom.predicate == HAS_VALUE else _ANY
+            read[atom.arguments[1]].append(frozenset({here}))
     for term, sides in read.items():
-        yield from itertools.combinations([*sides, *_number(term)], 2)
+        yield from combinations([*sides, *_number(term)], 2)
     for atom in rule.body:
         if atom.predicate in COMPARISONS:
-            sides = [
-                frozenset[str | Decimal]().union(*read.get(term, ()), *_number(term))
-                for term in atom.arguments
-            ]
-            yield from itertools.combinations(sides, 2)
+            sides = [_Side().union(*read.get(term, ()), *_number(term)) for term in atom.arguments]
+            yield from combinations(sides, 2)
 
 
 def _number(term: Term) -> list[_Side]:
@@ -253,10 +263,10 @@ def _says_more(triple: Triple) -> bool:
 def _has_equal_individuals(base: Ontology) -> bool:
     """Whether two individuals may be the same, or a rule may say so or give one a value."""
     triples = base.content.triples
-    inverse = rdf.members(triples, [rdf.OWL + "InverseFunctionalProperty"])
-    if inverse or rdf.subjects(triples, SAME):
+    inverse = members(triples, [OWL + "InverseFunctionalProperty"])
+    if inverse or subjects(triples, SAME):
         return True
-    functional = rdf.members(triples, [rdf.FUNCTIONAL])
+    functional = members(triples, [FUNCTIONAL])
     own = Counter((s, p) for s, p, o in triples if p in functional and isinstance(o, str))
     if max(own.values(), default=0) > 1:
         return True
@@ -268,5 +278,5 @@ def _equates(rule: Rule, functional: Collection[str]) -> bool:
     if rule.speaks_of_identity:
         return True
     concluded = {atom.predicate for atom in rule.head}
-    links = {atom.predicate for atom in rule.head if atom.kind == "object"}
-    return not (concluded.isdisjoint(_OF_VALUES) and links.isdisjoint(functional))
+    of_individuals = {atom.predicate for atom in rule.head if atom.kind == "object"}
+    return not (concluded.isdisjoint(_OF_VALUES) and of_individuals.isdisjoint(functional))

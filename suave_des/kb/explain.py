@@ -13,19 +13,32 @@ nearest, with the value found and the value needed.
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
+from itertools import filterfalse, islice
+from operator import attrgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError, shown, unknown
-from suave_des.kb import matching
-from suave_des.kb.matching import Binding, Bound, Facts, bound, with_bindings
+from suave_des.kb.matching import (
+    Binding,
+    Bound,
+    Facts,
+    bound,
+    concluding,
+    matches,
+    nearest_match,
+    shown_bindings,
+    stated,
+    told_of,
+    tracing_pellet,
+    unified,
+    with_bindings,
+)
 from suave_des.kb.states import FactReader
-from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Content, Ontology
 from suave_des.knowledge.pellet.in_process import (
     InProcessPellet,
@@ -34,7 +47,25 @@ from suave_des.knowledge.pellet.in_process import (
     one_at_a_time,
     trace_contradiction,
 )
-from suave_des.knowledge.rdf import Lit, Triple, local_name
+from suave_des.knowledge.rdf import (
+    C_STATUS,
+    HAS_QA_VALUE,
+    NUMERIC,
+    OWL,
+    RDF_TYPE,
+    TOMASYS,
+    Lit,
+    Triple,
+    canonical,
+    fact_of,
+    facts_of,
+    is_fact,
+    is_node,
+    local_name,
+    n_triple,
+    terms,
+    value_of,
+)
 from suave_des.knowledge.reasoner import performance
 from suave_des.knowledge.rules import (
     COMPARISONS,
@@ -116,21 +147,25 @@ class Tracer:
     """Derives the facts of one state.
 
     Attributes:
-        pellet: matching.tracing_pellet of the ontologies.
+        pellet: tracing_pellet of the ontologies.
     """
 
     base: Ontology
     state: KnowledgeState
-    pellet: InProcessPellet = field(repr=False)
-    _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
-    _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
-    _ways: dict[Triple, list[_Way]] = field(default_factory=dict, repr=False)
-    _asked: set[Triple] = field(default_factory=set, repr=False)
+    pellet: InProcessPellet
+    _found: dict[Triple, Derivation] = field(default_factory=dict)
+    _ways: dict[Triple, list[_Way]] = field(default_factory=dict)
+    _asked: set[Triple] = field(default_factory=set)
 
     @cached_property
     def asserted(self) -> frozenset[Triple]:
         """What ontologies and state assert."""
-        return frozenset((*self.base.assertions(self.state), *self.base.content.triples))
+        return frozenset((*self._given, *self.base.content.triples))
+
+    @cached_property
+    def _given(self) -> tuple[Triple, ...]:
+        """What the state asserts."""
+        return self.base.assertions(self.state)
 
     @cached_property
     def entailed(self) -> frozenset[Triple]:
@@ -139,9 +174,9 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        given = self.base.assertions(self.state)
         asks = any(rule.speaks_of_identity for rule in self.base.content.enabled_rules)
-        return self._told[0].union(self.asserted, self.pellet.identities(given) if asks else ())
+        same = self.pellet.identities(self._given) if asks else ()
+        return self._told[0].union(self.asserted, same)
 
     @cached_property
     def holding(self) -> frozenset[int]:
@@ -150,16 +185,13 @@ class Tracer:
 
     @cached_property
     def _told(self) -> tuple[frozenset[Triple], frozenset[int]]:
-        return matching.told_of(self.base, self.pellet.infer(self.base.assertions(self.state)))
+        return told_of(self.base, self.pellet.infer(self._given))
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
-        return tuple(
-            sorted(
-                {canonical_triple(triple) for triple in self.entailed if _is_told(triple)}, key=str
-            )
-        )
+        told = set(map(canonical_triple, filter(_is_told, self.entailed)))
+        return tuple(sorted(told, key=str))
 
     @cached_property
     def _facts(self) -> Facts:
@@ -175,9 +207,7 @@ class Tracer:
     def _schema(self) -> Content:
         """The ontologies without facts about individuals; all rules keep their numbers."""
         content = self.base.content
-        return replace(
-            content, triples=tuple(each for each in content.triples if not rdf.is_fact(each))
-        )
+        return replace(content, triples=tuple(filterfalse(is_fact, content.triples)))
 
     def derive(self, triple: Triple) -> Derivation:
         """Derive a triple that is entailed."""
@@ -192,16 +222,12 @@ class Tracer:
     def firings(self, rule: Rule) -> Iterator[tuple[Bound, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
         with one_at_a_time:
-            for binding in matching.matches(rule, self._facts):
-                concluded = [
-                    triple
-                    for atom in rule.head
-                    if (triple := matching.stated(atom, binding)) is not None
-                ]
+            for binding in matches(rule, self._facts):
+                concluded = _all_stated(rule.head, binding)
                 # What is the same, Pellet knows.
                 if all(canonical_triple(triple) in self._facts for triple in concluded):
                     facts = tuple(map(self._fact, sorted(concluded, key=str)))
-                    yield matching.shown_bindings(binding, self.base.names), facts
+                    yield shown_bindings(binding, self.base.names), facts
 
     def _collect(self, wanted: Triple) -> None:
         """Find all ways in which rules conclude a fact, and what they conclude it from, and so
@@ -214,7 +240,7 @@ class Tracer:
                 continue
             if triple in self._leaves:
                 leaf = self._leaves[triple]
-                source = "state" if leaf in self.base.assertions(self.state) else "ontology"
+                source = "state" if leaf in self._given else "ontology"
                 self._found[triple] = Derivation(self._fact(leaf), source)
             elif _is_expression(triple):
                 self._found[triple] = Derivation(self._fact(triple), "axioms")
@@ -224,11 +250,10 @@ class Tracer:
 
     def _ways_of(self, triple: Triple) -> Iterator[_Way]:
         for rule in self.base.content.enabled_rules:
-            for start in matching.concluding(rule, _both_ways(triple)):
-                for binding in matching.matches(rule, self._facts, start):
-                    said = (matching.stated(atom, binding) for atom in rule.body)
-                    body = dict.fromkeys(canonical_triple(one) for one in said if one is not None)
-                    bindings = matching.shown_bindings(binding, self.base.names)
+            for start in concluding(rule, _both_ways(triple)):
+                for binding in matches(rule, self._facts, start):
+                    body = dict.fromkeys(map(canonical_triple, _all_stated(rule.body, binding)))
+                    bindings = shown_bindings(binding, self.base.names)
                     yield _Way(tuple(body), rule.name, bindings)
 
     def _step(self) -> bool:
@@ -237,18 +262,17 @@ class Tracer:
         Returns:
             whether there was any.
         """
-        new: dict[Triple, _Way] = {}
+        new = {}
         for triple in self._open:
             ready = (way for way in self._ways[triple] if self._found.keys() >= {*way.body})
-            for way in itertools.islice(ready, 1):
+            for way in islice(ready, 1):
                 new[triple] = way
-        for triple, way in new.items():
-            derivation = Derivation(self._fact(triple), "rule", way.rule, way.bindings)
-            if way.rule is None:
-                axioms = self._axioms(triple, way.body)
-                derivation = replace(derivation, source="axioms", axioms=axioms)
-            premises = tuple(self._found[each] for each in way.body)
-            self._found[triple] = replace(derivation, premises=premises)
+        for triple, (body, rule, bindings) in new.items():
+            axioms = self._axioms(triple, body) if rule is None else ()
+            source = "axioms" if rule is None else "rule"
+            premises = tuple(self._found[each] for each in body)
+            fact = self._fact(triple)
+            self._found[triple] = Derivation(fact, source, rule, bindings, axioms, premises)
         return bool(new)
 
     @property
@@ -301,16 +325,17 @@ class Tracer:
         axioms = self._axioms(triple, self.asserted, self.base.content.enabled_rules)
         return Derivation(self._fact(triple), "axioms", axioms=axioms)
 
-    def _concluded(self, fact: Triple, asked: Atom) -> frozenset[Triple]:
+    @cached_property
+    def _concluded(self) -> Callable[[Triple, Atom], set[Triple]]:
         """What Pellet says of the property or class of an atom, from a fact and the schema
         alone.
         """
-        key = fact, asked
-        if key not in self._steps:
-            self._steps[key] = frozenset(
-                map(canonical_triple, entailed(self._text([fact], ()), [asked]))
-            )
-        return self._steps[key]
+
+        @cache
+        def concluded(fact: Triple, asked: Atom) -> set[Triple]:
+            return set(map(canonical_triple, entailed(self._text([fact], ()), [asked])))
+
+        return concluded
 
     def _text(self, facts: Iterable[Triple], rules: Sequence[Rule]) -> str:
         content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
@@ -324,17 +349,14 @@ class Tracer:
         """
         _, used = trace_contradiction(self._text(facts, rules) + _denial(triple))
         denied = f"({triple[0]},{triple[2]})"  # what is the same or different, by _denial
-        schema = (
-            each
+        return tuple(
+            _IRI.sub(lambda iri: self.base.names.short(iri.group()), each)
             for each in used
             if not each.startswith(("rule(", "prop(", "type(")) and denied not in each
         )
-        return tuple(
-            _IRI.sub(lambda iri: self.base.names.short(iri.group()), each) for each in schema
-        )
 
     def _fact(self, triple: Triple) -> Fact:
-        return rdf.fact_of(triple, self.base.names)
+        return fact_of(triple, self.base.names)
 
 
 class _Way(NamedTuple):
@@ -345,22 +367,27 @@ class _Way(NamedTuple):
     bindings: Bound = ()
 
 
+def _all_stated(atoms: Iterable[Atom], binding: Binding) -> list[Triple]:
+    """The triples that atoms say."""
+    return [said for atom in atoms if (said := stated(atom, binding)) is not None]
+
+
 def _is_expression(triple: Triple) -> bool:
     """Whether a triple says that something is a member of a class expression."""
-    return triple[1] == rdf.RDF_TYPE and rdf.is_node(triple[2])
+    return triple[1] == RDF_TYPE and is_node(triple[2])
 
 
 def _asked_of(triple: Triple) -> Atom:
     """An atom that asks for the class or property of a triple."""
     kind: AtomKind = "data" if isinstance(triple[2], Lit) else "object"
-    if triple[1] == rdf.RDF_TYPE:
+    if triple[1] == RDF_TYPE:
         return Atom("class", str(triple[2]), ())
     return Atom(kind, triple[1], ())
 
 
 def _is_told(triple: Triple) -> bool:
     """Whether derivations tell a triple: a fact, or what is the same or different."""
-    return rdf.is_fact(triple) or triple[1] in IDENTITIES
+    return is_fact(triple) or triple[1] in IDENTITIES
 
 
 def _both_ways(triple: Triple) -> tuple[Triple, ...]:
@@ -371,29 +398,27 @@ def _both_ways(triple: Triple) -> tuple[Triple, ...]:
 
 def canonical_triple(triple: Triple) -> Triple:
     """The triple that stands for all that say the same with another form of its value."""
-    return (*triple[:2], rdf.canonical(triple[2]))
+    return (*triple[:2], canonical(triple[2]))
 
 
 def _denial(triple: Triple) -> str:
     """Say in OWL that a triple does not hold, as N-Triples."""
     subject, predicate, value = triple
     if predicate in IDENTITIES:
-        return rdf.n_triple(
-            (subject, next(each for each in IDENTITIES if each != predicate), value)
-        )
+        return n_triple((subject, next(each for each in IDENTITIES if each != predicate), value))
     denied, restriction = "urn:denied", "urn:restriction"
     triples: list[Triple] = [
-        (denied, rdf.OWL + "complementOf", value if predicate == rdf.RDF_TYPE else restriction),
-        (denied, rdf.RDF_TYPE, rdf.OWL + "Class"),
-        (subject, rdf.RDF_TYPE, denied),
+        (denied, OWL + "complementOf", value if predicate == RDF_TYPE else restriction),
+        (denied, RDF_TYPE, OWL + "Class"),
+        (subject, RDF_TYPE, denied),
     ]
-    if predicate != rdf.RDF_TYPE:
+    if predicate != RDF_TYPE:
         triples += [
-            (restriction, rdf.RDF_TYPE, rdf.OWL + "Restriction"),
-            (restriction, rdf.OWL + "onProperty", predicate),
-            (restriction, rdf.OWL + "hasValue", value),
+            (restriction, RDF_TYPE, OWL + "Restriction"),
+            (restriction, OWL + "onProperty", predicate),
+            (restriction, OWL + "hasValue", value),
         ]
-    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(rdf.n_triple, triples)))
+    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(n_triple, triples)))
 
 
 _WORDS = {
@@ -404,18 +429,18 @@ _WORDS = {
     "=": "equal to",
     "!=": "different from",
 }
-_OF_GROUNDINGS = sorted(rdf.terms(rdf.TOMASYS, "FunctionGrounding typeFD solvesO"))
+_OF_GROUNDINGS = sorted(terms(TOMASYS, "FunctionGrounding typeFD solvesO"))
 #: What a state asserts, and how to give it where it is missing.
-_GIVEN_BY_STATES: Mapping[str, str] = {
+_GIVEN_BY_STATES = {
     **dict.fromkeys(_OF_GROUNDINGS, "; ground a function: --at FUNCTION=DESIGN"),
-    rdf.C_STATUS: "; report a component: --at COMPONENT=FALSE",
-    rdf.HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
-    rdf.TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
+    C_STATUS: "; report a component: --at COMPONENT=FALSE",
+    HAS_QA_VALUE: "; measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
+    TOMASYS + "Objective": "; ask for a function: --at FUNCTION",
 }
 #: All that states assert.
-_IN_STATES = rdf.terms(
-    rdf.TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve"
-).union(_GIVEN_BY_STATES)
+_IN_STATES = terms(TOMASYS, "QAvalue hasValue isQAtype typeF o_status o_always_improve").union(
+    _GIVEN_BY_STATES
+)
 
 
 class WhyNot(NamedTuple):
@@ -461,7 +486,7 @@ class RuleQuestions:
         if not answers:
             known = sorted({rule.name for rule in self.base.rules})
             raise unknown(f"there is no rule {shown(name)}", name, known)
-        return next((each for each in answers if each.fires), answers[0])
+        return max(answers, key=attrgetter("fires"))
 
     def of(
         self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})
@@ -478,7 +503,7 @@ class RuleQuestions:
         facts, firing = known
         if rule not in firing and never is not None:
             return WhyNot(rule.name, never)
-        binding, failing = matching.nearest_match(rule, facts, start)
+        binding, failing = nearest_match(rule, facts, start)
         if rule in firing and not (failing and start):
             return self._firing(rule, binding, is_known=not failing)
         if not failing:
@@ -488,7 +513,7 @@ class RuleQuestions:
 
     def _firing(self, rule: Rule, binding: Binding, *, is_known: bool) -> WhyNot:
         """Tell with what a rule fires, if that is known, and what it concludes."""
-        bindings = matching.shown_bindings(binding, self.base.names) if is_known else ()
+        bindings = shown_bindings(binding, self.base.names) if is_known else ()
         said = ", ".join(self._concluded(atom, binding) for atom in rule.head)
         words = f"it fires{with_bindings(bindings)}, and concludes {said}"
         return WhyNot(rule.name, words, fires=True)
@@ -507,8 +532,8 @@ class RuleQuestions:
         """Tell the first atom that fails of the nearest match of a rule; what no state can bring
         comes first.
         """
-        fixed = (number for number in failing if self._is_fixed(rule.body[number]))
-        first = rule.body[next(fixed, failing[0])]
+        atoms = [rule.body[number] for number in failing]
+        first = next(filter(self._is_fixed, atoms), atoms[0])
         reason = describe_failure(self._usable, first, binding, facts)
         others = len(failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
@@ -518,13 +543,13 @@ class RuleQuestions:
 
     def missing(self, triple: Triple, state: KnowledgeState) -> list[WhyNot]:
         """Say why no rule concludes a fact, of each that could; those that lack least first."""
-        found = []
-        for rule in self.base.content.enabled_rules:
-            for start in itertools.islice(matching.concluding(rule, [triple]), 1):
-                found.append(self.of(rule, state, start))
-        return sorted(
-            (each for each in found if not each.fires), key=lambda each: (each.failing, each.rule)
-        )
+        found = [
+            self.of(rule, state, start)
+            for rule in self.base.content.enabled_rules
+            for start in islice(concluding(rule, [triple]), 1)
+        ]
+        found.sort(key=attrgetter("failing", "rule"))
+        return [each for each in found if not each.fires]
 
     def _is_fixed(self, atom: Atom) -> bool:
         """Whether what an atom asks for is neither in states nor concluded by a rule."""
@@ -553,7 +578,7 @@ class RuleQuestions:
     @cached_property
     def _pellet(self) -> InProcessPellet:
         bodies = [rule.body for rule in self._usable.content.enabled_rules]
-        return matching.tracing_pellet(self._usable, bodies)
+        return tracing_pellet(self._usable, bodies)
 
     def _known(self, state: KnowledgeState) -> tuple[Facts, frozenset[Rule]] | str:
         """All that follows in a state and the rules that fire, or what contradicts what in it."""
@@ -578,14 +603,14 @@ class RuleQuestions:
             # Where rules ask what is different Pellet can fail on what it is asked besides.
             known = self._followed(rules, state)
             facts = Facts(known)
-            firing = {rule for rule in rules if matching.matches(rule, facts)}
+            firing = {rule for rule in rules if matches(rule, facts)}
         more = (rule for rule in rules if rule not in firing and self._adds(rule, state, known))
         return facts, frozenset([*firing, *more])
 
     def _followed(self, rules: Iterable[Rule], state: KnowledgeState) -> tuple[Triple, ...]:
         """All that follows in a state with some of the rules."""
         base = self._usable.with_rules(rules)
-        return Tracer(base, state, matching.tracing_pellet(base)).known
+        return Tracer(base, state, tracing_pellet(base)).known
 
     def _adds(self, rule: Rule, state: KnowledgeState, known: Iterable[Triple]) -> bool:
         """Whether something that a rule concludes follows with it alone, of all that is known.
@@ -598,11 +623,11 @@ class RuleQuestions:
         rules = self._usable.content.enabled_rules
         fewer = self._followed((each for each in rules if each is not rule), state)
         more = set(known).difference(fewer)
-        return next(matching.concluding(rule, more), None) is not None
+        return next(concluding(rule, more), None) is not None
 
     def _concluded(self, atom: Atom, binding: Binding) -> str:
-        fact = matching.stated(atom, binding)
-        return write_atom(atom) if fact is None else str(rdf.fact_of(fact, self.base.names))
+        fact = stated(atom, binding)
+        return write_atom(atom) if fact is None else str(fact_of(fact, self.base.names))
 
     def _concluder(self, rule: Rule, atom: Atom, binding: Binding, facts: Facts) -> str:
         """The rule that comes nearest to concluding what is missing, and why it does not."""
@@ -612,19 +637,17 @@ class RuleQuestions:
         found = []
         for other in self._usable.content.enabled_rules:
             for head in other.head if other is not rule else ():
-                start = matching.unified(head.arguments, wanted, {})
+                start = unified(head.arguments, wanted, {})
                 if (head.kind, head.predicate) != (atom.kind, atom.predicate) or start is None:
                     continue
-                nearest_one, failing = matching.nearest_match(other, facts, start)
+                nearest_one, failing = nearest_match(other, facts, start)
                 if failing:
                     first = other.body[failing[0]]
                     reason = describe_failure(self._usable, first, nearest_one, facts)
-                    found.append(
-                        (len(failing), other.name, f"its {write_atom(first)} fails: {reason}")
-                    )
-        return "".join(
-            f"; {name} would conclude it, but {why}" for _, name, why in sorted(found)[:1]
-        )
+                    why = f"its {write_atom(first)} fails: {reason}"
+                    words = f"; {other.name} would conclude it, but {why}"
+                    found.append((len(failing), other.name, words))
+        return min(found, default=(0, "", ""))[-1]
 
 
 def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
@@ -637,8 +660,8 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
         return _missing(base, atom, binding, facts)
     if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _compared(base, atom, binding)
-    values = {name: binding[name] for name in atom.variables() if name in binding}
-    texts = [f"?{name} = {_show(base, value)}" for name, value in values.items()]
+    known = dict.fromkeys(name for name in atom.variables() if name in binding)
+    texts = (f"?{name} = {_show(base, binding[name])}" for name in known)
     return f"it is false for {', '.join(texts) or 'these values'}"
 
 
@@ -670,9 +693,8 @@ def _compared(base: Ontology, atom: Atom, binding: Binding) -> str:
         for term, value in zip(atom.arguments, sides, strict=True)
     ]
     words = _WORDS[COMPARISONS[atom.predicate]]
-    kinds = [value.datatype for value in sides if isinstance(value, Lit)]
-    numbers = [kind in rdf.NUMERIC for kind in kinds]
-    if len(kinds) == 2 and numbers[0] != numbers[1]:
+    numbers = [value.datatype in NUMERIC for value in sides if isinstance(value, Lit)]
+    if sorted(numbers) == [False, True]:
         text = texts[numbers.index(False)]
         number = texts[numbers.index(True)]
         return (
@@ -699,8 +721,8 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Lit):
-        is_number = value.datatype in rdf.NUMERIC
-        is_plain = is_number and str(rdf.value_of(value, base.names)) == value.text
+        is_number = value.datatype in NUMERIC
+        is_plain = is_number and str(value_of(value, base.names)) == value.text
         return value.text if is_plain else write_term(value)
     return base.names.short(value)
 
@@ -791,7 +813,7 @@ class Explainer:
         for triple in sorted(
             tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))
         ):
-            for fact in rdf.facts_of([triple], base.names):
+            for fact in facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
         # Where several rules ask for what is the same or different, Pellet's inferences are not the
         # same each time.
@@ -802,10 +824,10 @@ class Explainer:
         question = question.strip()
         if why := _WHY.fullmatch(question):
             return Explanation(decisions=(self.design(why.group(1)),))
-        if question and "(" not in question:
-            raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
-        if question:
+        if "(" in question:
             return Explanation((self.fact(question),))
+        if question:
+            raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
         return Explanation(
             tuple(map(self.derive, self.facts)),
             tuple(map(self.decision, self.reasoning.plan.decisions)),
@@ -823,8 +845,8 @@ class Explainer:
             return self.tracer.derive(triple)
         fact = reader.fact(text)  # a value that the property cannot have is refused
         values = [value for s, p, value in self.tracer.known if (s, p) == triple[:2]]
-        texts = sorted(value_text(rdf.value_of(value, self.base.names)) for value in values)
-        name = "type" if triple[1] == rdf.RDF_TYPE else local_name(triple[1])
+        texts = sorted(value_text(value_of(value, self.base.names)) for value in values)
+        name = "type" if triple[1] == RDF_TYPE else local_name(triple[1])
         near = RuleQuestions(self.base).missing(triple, self.tracer.state)
         remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}"]
         remedies += (f"rule {each}" for each in near[:_MOST])

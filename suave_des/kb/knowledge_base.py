@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit, reasoning_on
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.rdf import PREFIXES, Triple, fact_of, n_triple
-from suave_des.knowledge.reasoner import Reasoner, regions_of
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.rules import IDENTITIES
 from suave_des.knowledge.state import (
     ContradictionError,
@@ -254,9 +254,11 @@ class KnowledgeBase:
             without = InProcessPellet(self.base.with_rules(()), self.base.content.all_terms())
             return self._tracing_pellet.identities(given) - without.identities(given)
 
-        found = self.limit.run(by_rules, reasoning_on(state))
-        pairs = {(*sorted((one, str(other))), name) for one, name, other in found if one != other}
-        facts = (fact_of((one, name, other), self.base.names) for one, other, name in pairs)
+        facts = {
+            fact_of((min(one, str(other)), name, max(one, str(other))), self.base.names)
+            for one, name, other in self.limit.run(by_rules, reasoning_on(state))
+            if one != other
+        }
         return tuple(sorted(facts, key=str))
 
     @plain_arguments
@@ -319,14 +321,12 @@ class KnowledgeBase:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        space, both = self.space.common(other.space), (self, other)
+        both = self, other
+        space = self.space.common(other.space)
         one, two = (States.of(each.base, each.settings, max_failed, space) for each in both)
         states = one.shared(two)
         before, after = (decide_all(each.base, states, each.outcome, on_count) for each in both)
-        no_proof = dict.fromkeys(
-            reason for each in both for reason in regions_of(each.base).reasons
-        )
-        return compare_decisions(states, before, after, tuple(no_proof))
+        return compare_decisions(states, before, after, [each.base for each in both])
 
     @plain_arguments
     def query(
@@ -381,29 +381,26 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         result = graph.query(query)
         if result.type == "ASK":
             return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
-        columns = _columns(result, text)
-        rows = [_texts(graph, each) for each in _answers(result, columns)]
+        columns, answers = _answers(result, text)
+        rows = [tuple(map(partial(_text, graph), each)) for each in answers]
     except Exception as error:  # evaluation raises whatever the functions of the query raise
         raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
     if result.type != "SELECT" or "OrderBy" not in str(query.algebra):
-        rows.sort(key=_sortable)
+        rows.sort(key=lambda row: [cell or "" for cell in row])
     return QueryResult(tuple(columns), tuple(rows), unknown)
 
 
-def _columns(result: Result, text: str) -> list[str]:
+def _answers(result: Result, text: str) -> tuple[list[str], Iterable[Iterable[object]]]:
+    """The columns of the answers, and their rows."""
     if result.type != "SELECT":
-        return ["subject", "predicate", "object"]
+        return ["subject", "predicate", "object"], result.graph or ()
     names = list(map(str, result.vars or ()))
-    is_all = "*" in text.partition("{")[0]  # which rdflib returns in any order
-    return sorted(names) if is_all else names
-
-
-def _answers(result: Result, columns: Sequence[str]) -> Iterator[Iterable[object]]:
-    if result.type != "SELECT":
-        yield from result.graph or ()
-        return
+    if "*" in text.partition("{")[0]:  # which rdflib returns in any order
+        names.sort()
+    rows = []
     for row in result:
-        yield [row[name] for name in columns]  # type: ignore
+        rows.append([row[name] for name in names])  # type: ignore
+    return names, rows
 
 
 def _parsed(text: str) -> Query:
@@ -432,18 +429,9 @@ def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
         yield f"{name} ({near})" if near else name
 
 
-def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:
-    return tuple(cell or "" for cell in row)
-
-
-def _texts(graph: rdflib.Graph, terms: Iterable[object]) -> tuple[str | None, ...]:
-    return tuple(_text(graph, term) for term in terms)
-
-
 def _text(graph: rdflib.Graph, term: object) -> str | None:
     if term is None:
         return None
     if isinstance(term, rdflib.URIRef):
-        name = graph.namespace_manager.normalizeUri(term)
-        return name.strip("<>") if name.startswith("<") else name
+        return graph.namespace_manager.normalizeUri(term).strip("<>")
     return f"_:{term}" if isinstance(term, rdflib.BNode) else str(term)

@@ -7,6 +7,7 @@ atom.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -39,6 +40,8 @@ Body = tuple[Atom, ...]
 Binding = Mapping[str, str | Lit]
 #: The same as people write it.
 Bound = tuple[tuple[str, Value], ...]
+#: A binding, and the numbers of the atoms that fail with it.
+_Way = tuple[Binding, tuple[int, ...]]
 _BINDING = ("class", "object", "data")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
 MOST_WAYS = 20_000
@@ -129,11 +132,11 @@ class Facts:
     """What follows in a state, to be looked up by property or class, and subject."""
 
     def __init__(self, known: Iterable[Triple]) -> None:
-        self._index: dict[tuple[str, str | None], list[Triple]] = {}
+        self._index = defaultdict[tuple[str, str | None], list[Triple]](list)
         for subject, predicate, value in known:
             name = str(value) if predicate == RDF_TYPE else predicate
             for key in ((name, subject), (name, None)):
-                self._index.setdefault(key, []).append((subject, predicate, canonical(value)))
+                self._index[key].append((subject, predicate, canonical(value)))
 
     def of(self, name: str, subject: str | Lit | None = None) -> Sequence[Triple]:
         """The triples of a property or class, about one subject; None: about any."""
@@ -163,9 +166,7 @@ def matches(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> 
     return sorted((binding for binding, _ in ways), key=str)
 
 
-def nearest_match(
-    rule: Rule, facts: Facts, start: Binding = MappingProxyType({})
-) -> tuple[Binding, tuple[int, ...]]:
+def nearest_match(rule: Rule, facts: Facts, start: Binding = MappingProxyType({})) -> _Way:
     """Find the extended binding with the fewest atoms of a rule's body that fail, and their
     numbers.
 
@@ -174,10 +175,10 @@ def nearest_match(
     """
     body = _canonical_body(rule)
 
-    def rank(way: tuple[Binding, tuple[int, ...]]) -> tuple[object, ...]:
+    def rank(way: _Way) -> tuple[object, ...]:
         binding, failing = way
-        distances = ((_distance(body[number], facts, binding), -number) for number in failing)
-        return tuple(distances), str(sorted(binding.items()))
+        distances = [(_distance(body[number], facts, binding), -number) for number in failing]
+        return distances, str(sorted(binding.items()))
 
     hopeless = {
         number
@@ -200,7 +201,7 @@ def _ways(
     binding: Binding,
     tries: Iterator[int],
     allowed: int = 0,
-) -> Iterator[tuple[Binding, tuple[int, ...]]]:
+) -> Iterator[_Way]:
     """Ways to match atoms, in an order, of which some may fail: binding, and numbers of those; as
     many as `tries`.
     """
@@ -258,7 +259,7 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
     """
     waiting = list(range(len(body)))
     known: set[str] = set()
-    order: list[int] = []
+    order = []
     while waiting:
         ready = (
             number
@@ -302,8 +303,8 @@ def _from_variables(atom: Atom) -> tuple[tuple[Triple, ...], tuple[Atom, ...]]:
     only.
     """
     given: list[Triple] = []
-    body: list[Atom] = []
-    terms: list[Term] = []
+    body = []
+    terms = []
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit):
             name, variable = f"{PROBE}#argument{number}", Variable(f"argument {number}")
@@ -356,8 +357,8 @@ def told_of(base: Ontology, triples: Iterable[Triple]) -> tuple[frozenset[Triple
     bodies that hold.
     """
     members = {name: atom.predicate for name, atom in _expressions(base).items()}
-    known: set[Triple] = set()
-    numbers: set[int] = set()
+    known = set()
+    numbers = set()
     for subject, predicate, value in triples:
         if predicate == _HOLDS and isinstance(value, Lit):
             numbers.add(int(value.text))

@@ -8,7 +8,7 @@ import itertools
 from collections import Counter
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from suave_des.errors import number_of
 from suave_des.kb.situations import INCONSISTENT, Decide, Outcome, Situation
@@ -22,8 +22,8 @@ from suave_des.tables import Table
 if TYPE_CHECKING:  # an inference alone needs no pandas, the larger part of its start
     import pandas
 
-FLIP_FLOP: Final = "flip-flop"
-_EXAMPLES: Final = 5
+FLIP_FLOP = "flip-flop"
+_EXAMPLES = 5
 #: Functions that have an objective, and (function, design) of those that are grounded.
 _TaskState = tuple[tuple[str, ...], tuple[tuple[str, str], ...]]
 
@@ -150,9 +150,9 @@ def make_policy(
 def _again(outcome: Outcome) -> Iterator[str]:
     """Functions that are decided on, and keep their design: its mode is requested again."""
     if outcome.reasoning is not None:
+        groundings = outcome.reasoning.inference.state.groundings
         for decision in outcome.reasoning.plan.decisions:
-            grounded = outcome.reasoning.inference.state.grounded(decision.function)
-            if decision.design is not None and decision.design == grounded:
+            if (decision.function, decision.design) in groundings:
                 yield decision.function
 
 
@@ -170,7 +170,7 @@ def _flipping(
     """Functions of each state whose decisions lead through other groundings back to its own, all
     else being equal.
     """
-    after: dict[_TaskState, _TaskState] = {}
+    after = {}
     for state, outcome in zip(states, outcomes, strict=True):
         asked = tuple(each.function for each in state.objectives)
         designs = dict(state.groundings)
@@ -193,10 +193,10 @@ def _round_trip(after: dict[_TaskState, _TaskState], start: _TaskState) -> list[
 
 def _in_words(reports: Reports, space: PolicySpace) -> str:
     """What components report: counted where they are interchangeable, else named."""
-    counted: Counter[str] = Counter()
+    counted = Counter[str]()
     named = set[str]()
     for component, status in reports:
-        kind = next(each for each in space.alike if component in each)
+        kind = space.alike_to(component)
         if len(kind) == 1:
             words = f"{component} {status}"
             named.add(words)
@@ -231,13 +231,12 @@ def function_table(policy: Policy, function: str) -> tuple[Table, int, str]:
     ]
     names = {f"{function}_now": "now", "reports": "components"}
     headings = [names.get(name, name.removesuffix("_now")) for name in down] + attributes[:-1]
+    columns = [*headings, "then"]
+    title = function
     if attributes:
-        across = attributes[-1]
-        outcomes = [words for _, words in ranges[-1]]
+        columns = [*headings, *(words for _, words in ranges[-1])]
         title = f"{function}, by measured {', '.join(attributes)}"
-    else:
-        across, outcomes, title = "", ["then"], function
-    columns = [*headings, *outcomes]
+    across = "".join(attributes[-1:])
     return Table(columns, rows, title, "l" * len(columns)), len(headings), across
 
 
@@ -280,7 +279,6 @@ def _needed(policy: Policy, function: str) -> tuple[Any, list[str]]:
     return cases, kept
 
 
-_Label = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
 #: An outcome for each place of the measured attributes.
 _Outcomes = dict[tuple[int, ...], str]
 
@@ -289,10 +287,10 @@ def _outcomes(cases: Any, kept: list[str], down: int) -> dict[tuple[str, ...], _
     """What happens by the dimensions that go down, and below them by the places of measured values."""
     found: dict[tuple[str, ...], _Outcomes] = {}
     for at, outcomes in cases.groupby(kept, sort=False)["outcome"]:
-        different = list(dict.fromkeys(outcomes))
-        text = different[0]
+        different = outcomes.unique()
+        text = " or ".join(different)
         if len(different) > 1:
-            text = f"{' or '.join(different)}, by the order of the values"
+            text += ", by the order of the values"
         found.setdefault(at[:down], {})[at[down:]] = text
     return found
 

@@ -4,12 +4,13 @@ decided.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
-from suave_des.errors import InputError, KnowledgeError, number_of
+from suave_des.errors import InputError, located, number_of
 from suave_des.kb.explain import Tracer
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.matching import tracing_pellet, with_bindings
@@ -60,10 +61,10 @@ class MissionReplay(NamedTuple):
 
     def _grouped(self, indent: str, kind: str) -> Iterator[str]:
         """Each text of a kind with its times."""
-        times: dict[str, list[float]] = {}
+        times = defaultdict(list)
         for t_s, each, text in self.found:
             if each == kind:
-                times.setdefault(text, []).append(t_s)
+                times[text].append(t_s)
         return (f"{indent}{_span(of_text)}: {text}" for text, of_text in times.items())
 
 
@@ -142,10 +143,8 @@ class _Trial:
         self.before = KnowledgeBase.of(base, settings, scenario.knowledge.reasoner, limit)
         tried = () if rule is None else read_rules(rule, base.vocabulary)
         unwanted = () if disabled is None else (disabled,)
-        try:
+        with located(place="--disable"):
             base.check_names((), unwanted)
-        except KnowledgeError as error:
-            raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
         self.after = self.before.changed(base.with_files((), [tried], unwanted))
         self.with_rule = self.after.base if disabled is None else base
         names = {disabled, *(each.name for each in tried)}

@@ -12,7 +12,8 @@ import itertools
 import os
 import re
 import stat
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.parsers import expat
@@ -32,7 +33,6 @@ from suave_des.knowledge.rdf import (
     SWRLA,
     XSD,
     Lit,
-    Triple,
     local_name,
     namespace,
 )
@@ -67,7 +67,7 @@ def add_rules(path: Path, given: str) -> list[Rule]:
     end = file.content.rindex(b"</")
     at = file.content.rfind(b"\n", 0, end) + 1
     at = end if file.content[at:end].strip() else at
-    _replace(file, file.content[:at] + added + file.content[at:], lambda known: [*known, *rules])
+    _replace(file, file.content[:at] + added + file.content[at:], [*rules_of(file), *rules])
     return rules
 
 
@@ -85,7 +85,7 @@ def remove_rule(path: Path, name: str) -> None:
         start = start if content[line:start].strip() else line
         blank = re.compile(rb"[ \t]*\r?\n").match(content, end)  # no empty line is left
         content = content[:start] + content[blank.end() if blank and start == line else end :]
-    _replace(file, content, lambda rules: [each for each in rules if each.name != name])
+    _replace(file, content, [each for each in rules_of(file) if each.name != name])
 
 
 def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
@@ -99,9 +99,12 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
         KnowledgeError: the file cannot be read, or has no such rule.
     """
     file = _read(path)
-    content, word = file.content, str(enabled).lower().encode()
+    content = file.content
+    word = str(enabled).lower().encode()
     spans = _spans_of(file, name)
-    if all(rule.enabled == enabled for rule in rules_of(file) if rule.name == name):
+    rules = rules_of(file)
+    intended = [replace(each, enabled=enabled) if each.name == name else each for each in rules]
+    if intended == list(rules):
         return False
     for start, end in sorted(spans, reverse=True):
         changed, marks = _MARK.subn(rb"\g<1>" + word, content[start:end])
@@ -110,11 +113,7 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
             mark = start_tag.encode() + word + b"</swrla:isRuleEnabled>"
             changed = changed[: tag.end()] + mark + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
-    _replace(
-        file,
-        content,
-        lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules],
-    )
+    _replace(file, content, intended)
     return True
 
 
@@ -213,9 +212,9 @@ def _rule_xml(rule: Rule) -> str:
         (atom.predicate, RDF_TYPE, _BUILTIN) for atom in rule.body if atom.kind == "builtin"
     ]
     mark = [] if rule.enabled else [(start, ENABLED, Lit("false", XSD + "boolean"))]
-    of: dict[str, list[Triple]] = {}
+    of = defaultdict(list)
     for triple in dict.fromkeys((*mark, *triples, *builtins)):
-        of.setdefault(triple[0], []).append(triple)
+        of[triple[0]].append(triple)
     root = etree.Element(_DESCRIPTION, nsmap=_PREFIXES)
     waiting = [(root, start)]
     # A list nests as deep as it is long, which is too deep for a recursion.
@@ -244,19 +243,18 @@ def _write_literal(element: etree._Element, predicate: str, value: Lit) -> None:
         element.set(f"{{{RDF}}}datatype", value.datatype)
 
 
-def _replace(
-    file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]
-) -> None:
-    """Replace the file, if its new content says what was intended; the old file is kept beside
-    it.
+def _replace(file: OntologyFile, content: bytes, intended: Iterable[Rule]) -> None:
+    """Replace the file, if its new content has the rules that were intended; the old file is kept
+    beside it.
     """
     try:
         result = read_ontology(file.path, content)
     except KnowledgeError as error:
         raise _cannot(file.path) from error
-    intended = sorted(map(_statement, change(list(rules_of(file)))), key=str)
-    written = sorted(map(_statement, rules_of(result)), key=str)
-    if written != intended or _others(file) != _others(result):
+    wanted, written = (
+        sorted(map(_statement, each), key=str) for each in (intended, rules_of(result))
+    )
+    if written != wanted or _others(file) != _others(result):
         raise _cannot(file.path)
     path = file.path.resolve()
     mode = stat.S_IMODE(path.stat().st_mode)

@@ -10,8 +10,9 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from operator import attrgetter
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import yaml
 from lxml import etree
@@ -21,7 +22,7 @@ from suave_des.errors import InputError, KnowledgeError, shown, unknown
 from suave_des.files import Json
 from suave_des.kb.explain import RuleQuestions, verdicts
 from suave_des.kb.knowledge_base import KnowledgeBase
-from suave_des.kb.scale import TestedRegion, measurements_in, parse_region
+from suave_des.kb.scale import measurements_in, parse_region
 from suave_des.kb.situations import Decide, Outcome, Situation
 from suave_des.kb.states import FactReader, StateBuilder, StateContent, recorded_state, state_dict
 from suave_des.knowledge.ontology import Ontology
@@ -34,12 +35,14 @@ from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 from suave_des.scenario.yamlfile import Layer, read_yaml, validated
 
 #: What XML 1.0 has no place for.
-_FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+_FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
 _Texts = Annotated[
     list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)
 ]
 #: The arguments of KnowledgeBase.load that say which knowledge base tests are about.
 Tested = Mapping[str, Any]
+#: An expectation that does not hold, in words, and the fact or function that it is about.
+_Unmet = tuple[str, Fact | str | None]
 
 
 class _Given(StateContent):
@@ -203,7 +206,7 @@ def _states(
         raise InputError(
             "mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7"
         )
-    regions: dict[str, TestedRegion] = {}
+    regions = {}
     for kind, name, value, _ in given.parts():
         region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
         builder.add(kind, name, value if region is None else 0)
@@ -265,12 +268,8 @@ def passes(test: RuleTest, outcome: Decide) -> bool:
     return not any(True for situation in test.situations for _ in _unmet(test, situation, outcome))
 
 
-def _unmet(
-    test: RuleTest, situation: Situation, outcome_of: Decide
-) -> Iterator[tuple[str, Fact | str | None]]:
-    """Each expectation that does not hold in a situation, in words, and the fact or function that
-    it is about.
-    """
+def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide) -> Iterator[_Unmet]:
+    """Each expectation that does not hold in a situation."""
     try:
         outcome = outcome_of(situation)
     except ReasonerTimeoutError:
@@ -284,9 +283,7 @@ def _unmet(
         yield f"the situation contradicts itself: {outcome.contradiction}", None
 
 
-def _unmet_by(
-    test: RuleTest, state: KnowledgeState, outcome: Outcome
-) -> Iterator[tuple[str, Fact | str | None]]:
+def _unmet_by(test: RuleTest, state: KnowledgeState, outcome: Outcome) -> Iterator[_Unmet]:
     """Each expectation that what follows and is decided in a state does not meet."""
     if test.contradicts:
         yield "the situation does not contradict itself", None
@@ -398,11 +395,8 @@ def tests_text(
         if value
     }
     content["tests"] = [
-        {
-            "name": name,
-            "given": _given(state),
-            **_expected(state, knowledge.outcome(Situation(state))),
-        }
+        {"name": name, "given": _given(state)}
+        | _expected(state, knowledge.outcome(Situation(state)))
         for name, state in states
     ]
     text = yaml.safe_dump(
@@ -437,10 +431,8 @@ def mission_states(
     """
     regions = regions_of(base)
     kinds = {regions.key(record.state): record for record in reversed(mission.records)}
-    return (
-        (record.t_s, replace(record.state, measured_since=None))
-        for record in sorted(kinds.values(), key=lambda record: record.t_s)
-    )
+    for record in sorted(kinds.values(), key=attrgetter("t_s")):
+        yield record.t_s, replace(record.state, measured_since=None)
 
 
 def mission_knowledge(mission: RecordedKnowledge) -> Tested:
@@ -451,12 +443,12 @@ def mission_knowledge(mission: RecordedKnowledge) -> Tested:
         name = scenario.name
     except InputError:
         name = DEFAULT_SCENARIO
-    files = [find(each, "ontology").absolute() for each in knowledge.ontologies]
+    ontologies = [find(each, "ontology").absolute() for each in knowledge.ontologies]
+    if all(file.parent == shipped_folder("ontology") for file in ontologies):
+        ontologies = []
     return {
         "scenario": name,
-        "ontologies": []
-        if all(file.parent == shipped_folder("ontology") for file in files)
-        else files,
+        "ontologies": ontologies,
         "rules": [find(each, "ontology").absolute() for each in knowledge.rules],
         "disabled_rules": list(knowledge.disabled_rules),
     }

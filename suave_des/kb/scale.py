@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -81,16 +82,25 @@ class Scale:
         high = low + 1 if high is None else high
         return exact(low + (high - low) * (rank + 1) / Decimal(2 ** ranks.bit_length()))
 
+    def places_in(self, *regions: TestedRegion) -> list[int]:
+        """The places whose values are in one of some regions."""
+        found = []
+        for place in range(len(self)):
+            value = self.value(place)
+            if any(is_in(region, value) for region in regions):
+                found.append(place)
+        return found
+
     def values(self, places: Sequence[int]) -> Iterator[tuple[Decimal | None, ...]]:
         """Values of several attributes at given places, for every order that the values can have.
 
         Values at different places are ordered by these; those in the same range can be in any
         order, and equal.
         """
-        alike: dict[int, list[int]] = {}  # the attributes whose values are in one range
+        alike = defaultdict(list)  # the attributes whose values are in one range
         for number, place in enumerate(places):
             if place % 2:
-                alike.setdefault(place, []).append(number)
+                alike[place].append(number)
         groups = list(alike.values())
         for ranks in itertools.product(*(_weak_orders(len(group)) for group in groups)):
             values = list(map(self.value, places))
@@ -137,7 +147,7 @@ def parse_region(text: str) -> TestedRegion | None:
         return None
     region = _bounds(text)
     scale = Scale(tuple(sorted({number for _, number in region})))
-    if not any(is_in(region, scale.value(at)) for at in range(1, len(scale))):
+    if not scale.places_in(region):
         raise InputError(f"no number is in the region {shown(text)}", remedy=_REGIONS)
     return region
 
@@ -146,7 +156,7 @@ def _bounds(text: str) -> TestedRegion:
     """Read the comparisons of a region, in which a point stands for the measured value."""
     parts = [part.strip() for part in _SIGN.split(f". {text}" if text[0] in "<>" else text)]
     sides = list(zip(parts[::2], parts[1::2], parts[2::2], strict=False))
-    bounds: list[tuple[str, Decimal]] = []
+    bounds = []
     for left, sign, right in sides:
         try:
             bounds.append((sign, exact(right)) if left == "." else (mirrored(sign), exact(left)))
@@ -165,9 +175,7 @@ def measurements_in(
     """
     ends = {number for region in regions.values() for _, number in region}
     scale = Scale(tuple(sorted({*regions_of(base).thresholds, *ends})))
-    inside = []
-    for region in regions.values():
-        inside.append([at for at in range(len(scale)) if is_in(region, scale.value(at))])
+    inside = map(scale.places_in, regions.values())
     for places in itertools.product(*inside):
         words = ", ".join(
             f"{name} {scale.text(at)}" for name, at in zip(regions, places, strict=True)

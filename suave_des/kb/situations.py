@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.state import STAYS, Fact, KnowledgeState, Reasoning
 
-INCONSISTENT: Final = "inconsistent"
+INCONSISTENT = "inconsistent"
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 import operator
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, partial
 from math import factorial, perm, prod
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -50,7 +50,7 @@ def component_reports(
         reports of the first ones of each group of interchangeable components, with the number for
         which they stand.
     """
-    found: dict[Reports, int] = {}
+    found = {}
     for chosen in itertools.product(*(_reported(group, statuses, most) for group in groups)):
         if sum(map(len, chosen)) <= most:
             reports = sorted(itertools.chain.from_iterable(map(zip, groups, chosen)))
@@ -93,21 +93,18 @@ class PolicySpace:
     @classmethod
     def of(cls, base: Ontology, settings: ManagingSettings) -> PolicySpace:
         """What can have an effect in these ontologies."""
-        attributes = tuple(
-            name for name in measured_attributes(base, settings) if has_effect(base, name)
-        )
-        functions = tuple(name for name in base.functions if base.designs(name))
+        attributes = filter(partial(has_effect, base), measured_attributes(base, settings))
+        functions = filter(base.designs, base.functions)
         # What the thruster monitor reports, and what enabled rules ask for.
         asked = texts_of(
             (atom for rule in base.content.enabled_rules for atom in rule.body), rdf.C_STATUS
         )
-        statuses = tuple(sorted({*asked, FAILED, RECOVERED}))
         return cls(
-            attributes,
+            tuple(attributes),
             regions_of(base).thresholds,
             interchangeable_components(base),
-            statuses,
-            functions,
+            tuple(sorted({*asked, FAILED, RECOVERED})),
+            tuple(functions),
         )
 
     @property
@@ -115,17 +112,17 @@ class PolicySpace:
         """The places of measured values."""
         return Scale(self.numbers)
 
+    def alike_to(self, component: str) -> tuple[str, ...]:
+        """The group of a component; empty if it has none."""
+        return next((group for group in self.alike if component in group), ())
+
     def common(self, other: PolicySpace) -> PolicySpace:
         """What has an effect in either; components are alike only if they are so in both that have
         them.
         """
-        groups: dict[tuple[int, ...], list[str]] = {}
-        for name in dict.fromkeys(name for group in (*self.alike, *other.alike) for name in group):
-            places = (
-                next((n for n, group in enumerate(s.alike) if name in group), -1)
-                for s in (self, other)
-            )
-            groups.setdefault(tuple(places), []).append(name)
+        groups = defaultdict(list)
+        for name in dict.fromkeys(itertools.chain(*self.alike, *other.alike)):
+            groups[self.alike_to(name), other.alike_to(name)].append(name)
         return PolicySpace(
             tuple(sorted({*self.attributes, *other.attributes})),
             tuple(sorted({*self.numbers, *other.numbers})),
@@ -177,7 +174,8 @@ class States:
             raise InputError(f"{max_failed} components cannot fail", remedy="give 0 or more")
         reports = component_reports(space.alike, space.statuses, max_failed)
         tasks = tuple(_tasks(base, settings, space))
-        scale, attributes = space.scale, space.attributes
+        scale = space.scale
+        attributes = space.attributes
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
         # else so many already that it does not matter how many values a range has
         if total <= MOST_STATES:
@@ -230,7 +228,7 @@ class States:
         ]
         columns["states"] = [self.reports[each.components] for each in states]
         for name in self.functions:
-            columns[f"{name}_now"] = [_present(each, name) for each in states]
+            columns[f"{name}_now"] = [present(each, name) for each in states]
         return pandas.DataFrame(columns)
 
     def shared(self, other: States) -> States:
@@ -238,7 +236,7 @@ class States:
         return replace(self, tasks=tuple(task for task in self.tasks if task in other.tasks))
 
 
-def _present(state: KnowledgeState, function: str) -> str:
+def present(state: KnowledgeState, function: str) -> str:
     """The grounding of a function that has an objective; empty if it has none."""
     if all(each.function != function for each in state.objectives):
         return ""
@@ -285,10 +283,10 @@ def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Ha
 
     def kind(state: KnowledgeState) -> Hashable:
         relevant = {name for each in state.objectives for name in effects[each.function]}
-        known = ((name, value) for name, value in state.measurements if name in relevant)
         seen = tuple(
             (name, value if regions is None else regions[name].region(value))
-            for name, value in known
+            for name, value in state.measurements
+            if name in relevant
         )
         return state.objectives, state.groundings, state.components, seen
 
@@ -318,7 +316,7 @@ def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount
         raise KnowledgeError(problem, file=", ".join(map(str, base.files)), remedy=remedy)
     kind = kind_of(base, states.space)
     different: dict[Hashable, KnowledgeState] = {}
-    decided: dict[Hashable, Outcome] = {}
+    decided = {}
     for state in states:
         different.setdefault(kind(state), state)
     on_count(0, len(different))

@@ -421,8 +421,7 @@ class StateBuilder:
                     self.add(kind, name, value)
         if state.measured_since is not None:
             known = self._known("measurements")
-            since = dict(state.measured_since)
-            self.measured_since = {name: since[name] for name in known if name in since}
+            self.measured_since = {name: at for name, at in state.measured_since if name in known}
 
     def state(self) -> KnowledgeState:
         """Build the state. Without objectives, it has those of the groundings, else those of the
@@ -463,15 +462,14 @@ def recorded_missions(folder: Path) -> Iterator[tuple[Path, RecordedKnowledge]]:
     """
     check_folder(folder)
     is_any_found = False
-    for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
+    for each in [folder, *sorted(filter(Path.is_dir, folder.iterdir()))]:
         if (each / KNOWLEDGE_FILE).is_file():
             is_any_found = True
             yield each, RecordedKnowledge("", 0, 0, *read_states(each))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
             is_any_found = True
-            yield from (
-                (each, mission) for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE)
-            )
+            for mission in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE):
+                yield each, mission
     if not is_any_found:
         problem = f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it"
         remedy = "record with run --manager metacontrol --out, or campaign --record-knowledge"

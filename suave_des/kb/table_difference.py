@@ -12,7 +12,6 @@ from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.situations import Decide, OnCount, Outcome, Situation
 from suave_des.kb.space import PolicySpace, States, decide_all
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoner import regions_of
 
 
 def compare_deciders(
@@ -36,15 +35,15 @@ def compare_deciders(
     space = reduce(PolicySpace.common, (each.space for each in both), knowledge.space)
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
     decide: list[Decide] = []
+    bases = []
     for each in both:
         if isinstance(each, DecisionTable):
             _check_designs(each, knowledge.base)
             decide.append(partial(_outcome, each))
         else:
             decide.append(decide_all(each.base, states, each.outcome, on_count))
-    bases = [each.base for each in both if not isinstance(each, DecisionTable)]
-    no_proof = dict.fromkeys(reason for base in bases for reason in regions_of(base).reasons)
-    return compare_decisions(states, decide[0], decide[1], tuple(no_proof), infer=False)
+            bases.append(each.base)
+    return compare_decisions(states, decide[0], decide[1], bases, infer=False)
 
 
 def _outcome(table: DecisionTable, situation: Situation) -> Outcome:

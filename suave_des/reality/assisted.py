@@ -9,7 +9,7 @@ far the simulation is off in others, so that intervals allow for that.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -232,20 +232,17 @@ def compare_assisted(
     same, population = simulated
     managers = [real.labels.get(name, name) for name in managers]
     frame = of_managers(real, managers).assign(source="")
-    for place, others in zip(_PLACES[1:], simulated, strict=True):
-        theirs = dict.fromkeys(others.frame["manager"])
-        for name in managers or frame["manager"].unique():
-            if name not in theirs:
-                raise unknown(f"there is no mission of {name}", name, theirs, "there are", place)
+    sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
+    _check_managers(sides, managers or frame["manager"].unique())
     check_one_mission(frame, _PLACES[0])
     if population.swept:
-        problem = (
-            f"it sweeps {population.swept[0]}, and points of a sweep share their random numbers"
+        problem = "points of a sweep share their random numbers"
+        raise InputError(
+            f"it sweeps {population.swept[0]}, and {problem}",
+            place="population",
+            remedy="draw the conditions, as perturbations",
         )
-        remedy = "draw the conditions, as perturbations"
-        raise InputError(problem, place="population", remedy=remedy)
     chosen = chosen_metrics(metrics or PAPER_METRICS, [Group("", frame)])
-    sides = dict(zip(_PLACES, (frame, same.frame, population.frame), strict=True))
     _check_values(sides, chosen)
     limit_s = common_limit_s(sides)
     if math.isfinite(limit_s):
@@ -259,6 +256,15 @@ def compare_assisted(
     notes += [*notes_on_missions(groups, (), frame, {}), *notes_on_metrics(groups, chosen)]
     rows, lacking = _estimates(matching, [group.name for group in groups], chosen)
     return AssistedComparison(pandas.DataFrame(rows), (*notes, *lacking), chosen)
+
+
+def _check_managers(sides: Mapping[str, pandas.DataFrame], names: Iterable[str]) -> None:
+    """Check that there are missions of managers on all sides."""
+    for place, frame in sides.items():
+        known = dict.fromkeys(frame["manager"])
+        for name in names:
+            if name not in known:
+                raise unknown(f"there is no mission of {name}", name, known, "there are", place)
 
 
 def _check_values(sides: Mapping[str, pandas.DataFrame], metrics: Sequence[Metric]) -> None:
@@ -312,10 +318,11 @@ def _shared(same: pandas.DataFrame, metric: str) -> pandas.DataFrame:
     return off.pivot_table("off", ["seed", "run"], "manager", observed=True)
 
 
-def _of(both: list[str], means: pandas.DataFrame) -> Any:
-    """Return a column for each value and manager."""
-    by_manager: Any = means.unstack()
-    return by_manager.reindex(columns=pandas.MultiIndex.from_product([means.columns, both]))
+def _of(both: list[str], means: pandas.DataFrame, *needed: str) -> Any:
+    """Return a column for each value and manager, where all have the values that are needed."""
+    found: Any = means.unstack()
+    found = found.reindex(columns=pandas.MultiIndex.from_product([means.columns, both]))
+    return found[found[[*needed]].notna().all(axis=1)]
 
 
 def _estimate(
@@ -333,10 +340,8 @@ def _estimate(
         conditions: means of real and same as of _means; likewise draws, of draw.
         shared: how far simulated missions are off by chance that conditions share, as of _shared.
     """
-    own = _of(both, conditions)
-    own = own[own[["real", "same"]].notna().all(axis=1)]
-    drawn = _of(both, draws)
-    drawn = drawn[drawn["draw"].notna().all(axis=1)]
+    own = _of(both, conditions, "real", "same")
+    drawn = _of(both, draws, "draw")
     _check_numbers(f"{metric.title} of {' - '.join(both)}", own, len(drawn))
     signs = np.array([1.0, -1.0][: len(both)])
     real, same, population = (

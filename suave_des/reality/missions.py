@@ -63,6 +63,8 @@ _GIVE_NUMBERS = (
 )
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
+_Numbers = NDArray[np.int64]
+"""Of the conditions of missions, from 1."""
 
 # Targets
 
@@ -209,11 +211,10 @@ def numbered(
 
 def _by_values(
     conditions: pandas.DataFrame, runs: pandas.DataFrame, named: Sequence[str]
-) -> NDArray[np.int64]:
+) -> _Numbers:
+    columns = [runs[name] for name in named]
     points = conditions[named].itertuples(index=False, name=None)
-    fits = np.array(
-        [np.all([*map(_same, (runs[name] for name in named), values)], axis=0) for values in points]
-    )
+    fits = np.array([np.all([*map(_same, columns, values)], axis=0) for values in points])
     for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
         given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
         fitting = ", ".join(str(number) for number in 1 + np.flatnonzero(fits[:, row])) or "none"
@@ -234,7 +235,7 @@ def _starts_of(conditions: pandas.DataFrame) -> pandas.DataFrame:
 
 def _in_order(
     runs: pandas.DataFrame, conditions: int, runs_each: int | None, starts: pandas.DataFrame
-) -> NDArray[np.int64]:
+) -> _Numbers:
     """Number the conditions of missions by their order, manager by manager."""
     numbers = np.zeros(len(runs), dtype=np.int64)
     for manager, rows in runs.groupby("manager", sort=False).indices.items():
@@ -258,7 +259,7 @@ def _block(
     fitting = [
         each for each in possible if _starts_fit(missions, _in_blocks(missions, each), starts)
     ]
-    if runs_each is not None and runs_each in fitting:
+    if runs_each in fitting:
         return runs_each
     if possible and not fitting:
         return f"which do not begin where the {conditions} conditions have their starts, in order"
@@ -278,13 +279,11 @@ def _possible_blocks(number: int, conditions: int) -> list[int]:
     return [each for each in range(1, number + 1) if -(-number // each) == conditions]
 
 
-def _in_blocks(missions: pandas.DataFrame, block: int) -> NDArray[np.int64]:
+def _in_blocks(missions: pandas.DataFrame, block: int) -> _Numbers:
     return np.arange(len(missions), dtype=np.int64) // block + 1
 
 
-def _starts_fit(
-    missions: pandas.DataFrame, numbers: NDArray[np.int64], starts: pandas.DataFrame
-) -> bool:
+def _starts_fit(missions: pandas.DataFrame, numbers: _Numbers, starts: pandas.DataFrame) -> bool:
     """Return whether each mission begins where its condition has its start, as far as that is
     known.
     """
@@ -386,16 +385,14 @@ def read_real(
 
 def _each_once(read: Sequence[Runs]) -> dict[Path, str]:
     """Return the files of missions with their digests; no two may have the same content."""
-    files: dict[Path, str] = {}
     known: dict[str, Path] = {}
     for runs in read:
         for path, digest in runs.files.items():
             if digest in known:
                 problem = f"has the same content as {known[digest]}"
                 raise InputError(problem, file=path, remedy="give each file once")
-            files[path] = digest
             known[digest] = path
-    return files
+    return {path: digest for digest, path in known.items()}
 
 
 @contextmanager
@@ -526,9 +523,10 @@ def _check_scenario(
     """Check that a population is of the scenario of the missions under the real conditions, and
     varies in what these vary in.
     """
-    scenarios = sorted(set(same["scenario"]) - {""}), sorted(set(population["scenario"]) - {""})
-    if all(scenarios) and scenarios[0] != scenarios[1]:
-        problem = f"it is of scenario {scenarios[1][0]}, and the missions under the real conditions of {scenarios[0][0]}"
+    ours = sorted(set(same["scenario"]) - {""})
+    theirs = sorted(set(population["scenario"]) - {""})
+    if ours and theirs and ours != theirs:
+        problem = f"it is of scenario {theirs[0]}, and the missions under the real conditions of {ours[0]}"
         raise InputError(problem, remedy="give campaigns of one scenario")
     for name in names:
         if name not in population:
@@ -612,10 +610,8 @@ def published_for(scenario: str | Path) -> Path | None:
     """Return the file of the real missions that were published for a scenario or campaign file, if
     there are any.
     """
-    own = (
-        shipped_folder("scenarios/published")
-        / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
-    )
+    name = Path(scenario).stem.removesuffix("_campaign")
+    own = shipped_folder("scenarios/published") / f"{name}_runs.csv"
     return own if own.is_file() else None
 
 
@@ -639,13 +635,12 @@ def read_targets(
     Raises:
         InputError: with file and line: one cannot be read, or is not valid.
     """
-    beside = [path.with_suffix(".targets.yaml") for path in real.files]
-    paths = (given,) if given else tuple(path for path in beside if path.is_file())
-    lists = [validated(read_yaml(path), Targets) for path in paths]
+    beside = (path.with_suffix(".targets.yaml") for path in real.files)
+    paths = (given,) if given else tuple(filter(Path.is_file, beside))
     shares: list[Share] = []
-    for each in lists:
-        shares += [share for share in each.shares if share not in shares]
-    limits: dict[str, ConditionLimits] = {
-        metric: limit for each in lists for metric, limit in each.conditions.items()
-    }
+    limits: dict[str, ConditionLimits] = {}
+    for path in paths:
+        targets = validated(read_yaml(path), Targets)
+        shares += [share for share in targets.shares if share not in shares]
+        limits.update(targets.conditions.items())
     return tuple(shares), limits, paths

@@ -55,6 +55,8 @@ _LEAST_AGREEMENT = 0.5
 _LEAST_CONDITIONS = 2
 """With one, missions are independent."""
 _TARGET = ("kind", "subject", "what", "value", "low", "high")
+_Requirement = tuple[Any, ...]
+"""With these columns."""
 _SIGNIFICANT_DIGITS = 8
 
 _Generators = Callable[[str], np.random.Generator]
@@ -66,7 +68,6 @@ TABLES = {"cells": "validation.csv"}
 TABLES |= {name: f"validation_{name}.csv" for name in ("pairs", "shares", "conditions", "targets")}
 """Names of the tables, and their files."""
 JSON_FILE = "validation.json"
-FILES = (*TABLES.values(), JSON_FILE)
 
 
 @dataclass(frozen=True)
@@ -231,11 +232,10 @@ def _samples(
 ) -> dict[tuple[str, str], list[Sample]]:
     """Return the values of each metric and manager on each side, where all sides have some."""
     found = {}
-    for metric in COMPARED:
-        for manager in managers:
-            samples = [sample(side, manager, metric) for side in sides]
-            if all(map(len, samples)):
-                found[metric, manager] = samples
+    for metric, manager in product(COMPARED, managers):
+        samples = [sample(side, manager, metric) for side in sides]
+        if all(map(len, samples)):
+            found[metric, manager] = samples
     return found
 
 
@@ -260,7 +260,7 @@ def _put_over_conditions(
         cells.loc[row, list(columns)] = pandas.Series(columns, dtype=float)
 
 
-def _judged(required: Iterable[tuple[Any, ...]]) -> pandas.DataFrame:
+def _judged(required: Iterable[_Requirement]) -> pandas.DataFrame:
     """Return requirements, with whether each is met: None of one that cannot be judged."""
     targets = pandas.DataFrame(required, columns=_TARGET).astype(dict.fromkeys(_TARGET[3:], float))
     value = targets["value"]
@@ -288,7 +288,7 @@ def _with_common_limit(
     if not known_s:
         return None, sides
     longest_s = [float(side.loc[~is_lost, SEARCH_TIME].max()) for side, is_lost in pairs]
-    limit_s = max(known_s[-1], *(each for each in longest_s if not math.isnan(each)))
+    limit_s = float(np.nanmax([known_s[-1], *longest_s]))
     counted = [
         side.assign(**{SEARCH_TIME: side[SEARCH_TIME].mask(is_lost, limit_s)})
         for side, is_lost in pairs
@@ -323,7 +323,8 @@ def _cell(
 
     rng = generators(f"bootstrap/{manager}/{metric}")
     ks = ks_2samp(real, ours)
-    ad = statistics.anderson_darling(real, ours, generators(f"permutations/{manager}/{metric}"))
+    permutations = generators(f"permutations/{manager}/{metric}")
+    ad_statistic, ad_p = statistics.anderson_darling(real, ours, permutations)
     return {
         "manager": manager,
         "metric": metric,
@@ -331,8 +332,10 @@ def _cell(
         **_described("simulated", ours),
         **statistics.difference_interval(ours, real).columns("difference_of_means"),
         **statistics.ratio_interval(real, ours, rng).columns("std_ratio"),
-        **{"ks_distance": float(ks.statistic), "ks_p": float(ks.pvalue)},
-        **dict(zip(("ad_statistic", "ad_p"), ad, strict=True)),
+        "ks_distance": float(ks.statistic),
+        "ks_p": float(ks.pvalue),
+        "ad_statistic": ad_statistic,
+        "ad_p": ad_p,
     }
 
 
@@ -345,8 +348,7 @@ def _pair(
     """Compare two managers in a metric (metric, manager), each with its real and its simulated
     sample.
     """
-    metric = one[0]
-    first = one[1]
+    metric, first = one
     second = other[1]
     (real, ours), (other_real, other_ours) = samples
     # By the normal approximation, as the subsamples below are tested.
@@ -469,17 +471,14 @@ def compare_conditions(
         sides = []
         for name, side in (("real", real), ("simulated", simulated)):
             by = side[side[metric].notna()].groupby(["manager", CONDITION], observed=True)[metric]
-            statistics_of = by.agg(["count", "mean", "std", "median"])
-            sides.append(
-                statistics_of.set_axis(
-                    [f"{name}_{each}" for each in ("n", "mean", "std", "median")], axis=1
-                )
-            )
+            found = by.agg(["count", "mean", "std", "median"]).rename(columns={"count": "n"})
+            sides.append(found.add_prefix(f"{name}_"))
         both = pandas.concat(sides, axis=1, join="inner").sort_index().reset_index()
         both.insert(1, "metric", metric)
         parts += [both[both["manager"] == manager] for manager in managers]
-    found = pandas.concat(parts, ignore_index=True)
-    return found.assign(difference_of_medians=found["simulated_median"] - found["real_median"])
+    compared = pandas.concat(parts, ignore_index=True)
+    difference = compared["simulated_median"] - compared["real_median"]
+    return compared.assign(difference_of_medians=difference)
 
 
 def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
@@ -494,13 +493,16 @@ def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
     for metric, of_metric in compared.groupby("metric", sort=False) if len(compared) else ():
         for manager, own in [*of_metric.groupby("manager", sort=False), ("all", of_metric)]:
             real, ours = own[["real_std", "simulated_std"]].astype(float).dropna().median().tolist()
-            row = {"manager": manager, "metric": metric, "conditions": len(own)}
-            row |= {
+            row = {
+                "manager": manager,
+                "metric": metric,
+                "conditions": len(own),
                 "difference": own["difference_of_medians"].abs().median(),
                 "real_std": real,
                 "simulated_std": ours,
+                "std_ratio": ours / real if real else math.nan,
             }
-            rows.append({**row, "std_ratio": ours / real if real else math.nan})
+            rows.append(row)
     return pandas.DataFrame(rows)
 
 
@@ -513,8 +515,8 @@ def _targets(
     shares: pandas.DataFrame,
     within: pandas.DataFrame,
     limits: Mapping[str, ConditionLimits],
-) -> Iterator[tuple[Any, ...]]:
-    """Yield the requirements, with the columns of _TARGET.
+) -> Iterator[_Requirement]:
+    """Yield the requirements.
 
     The mean lies in the 95% t interval of the published one, the std in its chi-square interval;
     the KS p is 0.05 or more; at least half the subsamples as large as the published samples lead to
@@ -535,7 +537,7 @@ def _targets(
             yield from _targets_within(each, limit)
 
 
-def _targets_of_cell(cell: Mapping[Any, Any]) -> Iterator[tuple[Any, ...]]:
+def _targets_of_cell(cell: Mapping[Any, Any]) -> Iterator[_Requirement]:
     manager = cell["manager"]
     metric = cell["metric"]
     for kind in ("mean", "std"):
@@ -545,18 +547,18 @@ def _targets_of_cell(cell: Mapping[Any, Any]) -> Iterator[tuple[Any, ...]]:
     yield "ks", manager, metric, cell["ks_p"], SIGNIFICANCE, None
 
 
-def _targets_within(row: Mapping[Any, Any], limit: ConditionLimits) -> Iterator[tuple[Any, ...]]:
-    metric = row["metric"]
-    if limit.median_difference is not None:
-        most = limit.median_difference
-        yield "condition_median", "all", metric, row["difference"], None, most
-    if limit.std_ratio is not None:
-        yield "condition_std", "all", metric, row["std_ratio"], None, limit.std_ratio
+def _targets_within(row: Mapping[Any, Any], limit: ConditionLimits) -> Iterator[_Requirement]:
+    for kind, column, most in (
+        ("condition_median", "difference", limit.median_difference),
+        ("condition_std", "std_ratio", limit.std_ratio),
+    ):
+        if most is not None:
+            yield kind, "all", row["metric"], row[column], None, most
 
 
 # Tables
 
-_VERDICTS: Mapping[bool | None, str] = {True: "met", False: "NOT MET", None: "not judged"}
+_VERDICTS = {True: "met", False: "NOT MET", None: "not judged"}
 _KINDS = {
     "ks": "KS p",
     "conclusion": "agreeing conclusions",
@@ -607,10 +609,43 @@ _METRIC, _MANAGER = ("metric", "{of.brief}"), ("manager", "{manager}")
 def _tables(validation: Validation, real: str) -> Iterator[Table]:
     runs = "real runs" if real == "real" else real
     yield _samples_table(validation.cells, runs)
-    yield _differences_table(validation.cells, real, runs)
-    yield _pairs_table(validation.pairs, real)
+    yield _table(
+        validation.cells,
+        f"Simulated compared with {runs} (difference = simulated - {real})",
+        "ll",
+        _METRIC,
+        _MANAGER,
+        ("difference of means", "{difference_of_means:+.2f}"),
+        _interval("difference_of_means", "+.1f"),
+        ("std ratio", "{std_ratio:.2f}"),
+        _interval("std_ratio", ".2f"),
+        ("KS p", "{ks_p:p}"),
+        ("AD p", "{ad_p:p}"),
+    )
+    of_size = f"Mann-Whitney tests of samples of the {real} size"
+    yield _table(
+        validation.pairs,
+        f"Pairs: probability that the first is better; {of_size}",
+        "ll",
+        _METRIC,
+        ("first, second", "{first}, {second}"),
+        (real, "{published_superiority:.2f}"),
+        ("simulated", "{simulated_superiority:.2f}"),
+        (f"{real}: better", "{published_better}"),
+        ("simulated agrees", "{agreement:share}"),
+    )
     yield _shares_table(validation.shares, real)
-    yield _conditions_table(validation.conditions, real)
+    yield _table(
+        over_conditions(validation.conditions),
+        "Within conditions: medians over the conditions",
+        "ll",
+        _METRIC,
+        _MANAGER,
+        ("|difference|", "{difference:.2f}"),
+        (f"std: {real}", "{real_std:.2f}"),
+        ("simulated", "{simulated_std:.2f}"),
+        ("ratio", "{std_ratio:.2f}"),
+    )
     rows = [_target(each) for each in rows_of(validation.targets)]
     yield Table(("of", "what", "simulated", "must be", ""), rows, "Targets", "llrrl")
 
@@ -622,38 +657,6 @@ def _samples_table(cells: pandas.DataFrame, runs: str) -> Table:
         for name, style in (("n", ".0f"), ("mean", ".2f"), ("std", ".2f"), ("median", ".2f"))
     ]
     return _table(cells, f"Samples: {runs}, then simulated", "ll", _METRIC, _MANAGER, *columns)
-
-
-def _differences_table(cells: pandas.DataFrame, real: str, runs: str) -> Table:
-    title = f"Simulated compared with {runs} (difference = simulated - {real})"
-    return _table(
-        cells,
-        title,
-        "ll",
-        _METRIC,
-        _MANAGER,
-        ("difference of means", "{difference_of_means:+.2f}"),
-        _interval("difference_of_means", "+.1f"),
-        ("std ratio", "{std_ratio:.2f}"),
-        _interval("std_ratio", ".2f"),
-        ("KS p", "{ks_p:p}"),
-        ("AD p", "{ad_p:p}"),
-    )
-
-
-def _pairs_table(pairs: pandas.DataFrame, real: str) -> Table:
-    of_size = f"Mann-Whitney tests of samples of the {real} size"
-    return _table(
-        pairs,
-        f"Pairs: probability that the first is better; {of_size}",
-        "ll",
-        _METRIC,
-        ("first, second", "{first}, {second}"),
-        (real, "{published_superiority:.2f}"),
-        ("simulated", "{simulated_superiority:.2f}"),
-        (f"{real}: better", "{published_better}"),
-        ("simulated agrees", "{agreement:share}"),
-    )
 
 
 def _shares_table(shares: pandas.DataFrame, real: str) -> Table:
@@ -671,20 +674,6 @@ def _shares_table(shares: pandas.DataFrame, real: str) -> Table:
         _interval("published_share", ".0%"),
         ("simulated", "{simulated_share:share}"),
         ("", "{mark}"),
-    )
-
-
-def _conditions_table(conditions: pandas.DataFrame, real: str) -> Table:
-    return _table(
-        over_conditions(conditions),
-        "Within conditions: medians over the conditions",
-        "ll",
-        _METRIC,
-        _MANAGER,
-        ("|difference|", "{difference:.2f}"),
-        (f"std: {real}", "{real_std:.2f}"),
-        ("simulated", "{simulated_std:.2f}"),
-        ("ratio", "{std_ratio:.2f}"),
     )
 
 
@@ -715,11 +704,6 @@ def _range(low: str, high: str) -> str:
 MARK = "*"
 """Marks figures outside the paper's interval."""
 PAPER_FILE = "paper_table.md"
-
-
-def _is_shown(difference: Estimate) -> bool:
-    """Whether a difference is not what chance may be."""
-    return difference.has_interval and not difference.contains(0.0)
 
 
 @dataclass(frozen=True)
@@ -779,7 +763,9 @@ class PaperComparison:
             apart = self._from_metacontrol(metric)
             if not apart:
                 continue
-            chance = [name for name, each in apart.items() if not _is_shown(each)]
+            chance = [
+                name for name, each in apart.items() if each.contains(0.0) or not each.has_interval
+            ]
             rest = f"; the difference from {' and '.join(chance)} could be chance" if chance else ""
             less_others = [each.value for each in apart.values()]
             claim = _claim_of_time if metric == SEARCH_TIME else _claim_of_distance
