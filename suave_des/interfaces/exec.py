@@ -16,7 +16,7 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from functools import cache, partial
@@ -266,9 +266,7 @@ class ExecManager(ManagingSubsystem):
             settings=settings,
             learned=learned,
             attributes=list(system.measurements),
-            functions={
-                function: system.modes.available_modes(function) for function in system.modes.nodes
-            },
+            functions=self._available_modes(),
             mission_wide_functions=system.functions,
         )
         if answer.pop("protocol", PROTOCOL) != PROTOCOL:
@@ -278,6 +276,10 @@ class ExecManager(ManagingSubsystem):
         except (TypeError, ValueError, AttributeError, KeyError) as error:
             raise self._error(f"answered {shown(answer)} to mission_started: {error}") from None
         self._begin = answer
+
+    def _available_modes(self) -> dict[str, Sequence[str]]:
+        modes = self.system.modes
+        return {function: modes.available_modes(function) for function in modes.nodes}
 
     def _take_settings(self, answer: Json) -> None:
         period_s = answer.pop("period_s", None)
@@ -385,21 +387,23 @@ class ExecManager(ManagingSubsystem):
                 f"answered {shown(dict(answer))}; modes is an object, log a list of texts"
             )
         requests = self.system.modes.requests
+        latency_s = answer.get("latency_s", 0.0)
         for line in lines:
             self.system.log("says", str(line))
         for function, mode in modes.items():
-            is_accepted = isinstance(mode, str) and self.system.change_mode(function, mode)
-            if not is_accepted and mode not in self.system.modes.available_modes(function):
-                known = {
-                    each: self.system.modes.available_modes(each)
-                    for each in self.system.modes.nodes
-                }
-                near = did_you_mean(mode, known.get(function, known), "known")
-                raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
+            self._request(function, mode)
         if self.system.modes.requests > requests:
-            self.reasoning_time_s += answer.get("latency_s", 0.0)
-        if answer.get("latency_s"):
+            self.reasoning_time_s += latency_s
+        if latency_s:
             self.system.state_changed()
+
+    def _request(self, function: str, mode: object) -> None:
+        """Request a mode; a ProgramError if there is none of that name."""
+        is_accepted = isinstance(mode, str) and self.system.change_mode(function, mode)
+        if not is_accepted and mode not in self.system.modes.available_modes(function):
+            known = self._available_modes()
+            near = did_you_mean(mode, known.get(function, known))
+            raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
 
     def _error(self, problem: str) -> ProgramError:
         return ProgramError(f"the program {problem}")

@@ -102,17 +102,17 @@ class Session:
         self._record = record
         self._thought_s = 0.0
         self._lock = threading.Lock()
-        self._paths: dict[tuple[str, str], Callable[[object], Json]] = {
-            ("GET", "/"): lambda _: dict(REQUESTS),
-            ("GET", "/monitor"): lambda _: self._monitor(),
-            ("PUT", "/execute"): self._execute,
-            ("GET", "/adaptation_options"): lambda _: self._options(),
-            ("GET", "/monitor_schema"): lambda _: self._monitor_schema(),
-            ("GET", "/execute_schema"): lambda _: self._execute_schema(),
-            ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
-            ("POST", "/advance"): self._advance,
-            ("POST", "/start"): self._start,
-            ("GET", "/metrics"): lambda _: self._metrics(),
+        self._answers: dict[str, Callable[[object], Json]] = {
+            "GET /": lambda _: dict(REQUESTS),
+            "GET /monitor": lambda _: self._monitor(),
+            "PUT /execute": self._execute,
+            "GET /adaptation_options": lambda _: self._options(),
+            "GET /monitor_schema": lambda _: self._monitor_schema(),
+            "GET /execute_schema": lambda _: self._execute_schema(),
+            "GET /adaptation_options_schema": lambda _: self._options_schema(),
+            "POST /advance": self._advance,
+            "POST /start": self._start,
+            "GET /metrics": lambda _: self._metrics(),
         }
         self._begin(run, seed)
 
@@ -148,13 +148,14 @@ class Session:
             before_s = self.mission.now_s
             self.mission.advance(self.due_s())
             self._thought_s = self.mission.now_s - before_s
-            if (serve := self._paths.get((method, path))) is None:
+            if (serve := self._answers.get(f"{method} {path}")) is None:
                 raise LookupError(path)
             return serve(content)
 
     def methods(self, path: str) -> list[str]:
         """List the methods that a path answers."""
-        return [method for method, known in self._paths if known == path]
+        end = f" {path}"
+        return [each.removesuffix(end) for each in self._answers if each.endswith(end)]
 
     def _begin(self, run: int, seed: int) -> None:
         self.mission = Mission(
