@@ -8,7 +8,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import chain, count
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from suave_des.files import decode, read_bytes
 from suave_des.knowledge import rdf
 from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rdf import Lit, Triple, local_name
 from suave_des.knowledge.rules import Atom, AtomKind, Named, Place, Rule, RuleError, Term, Variable
 from suave_des.knowledge.rules.expressions import in_words
 from suave_des.knowledge.rules.parser import parse_rules
@@ -64,15 +64,15 @@ class Vocabulary:
     @classmethod
     def of(
         cls,
-        triples: Sequence[rdf.Triple],
-        structure: Sequence[rdf.Triple],
+        triples: Sequence[Triple],
+        structure: Sequence[Triple],
         individuals: Iterable[str],
         enumerations: Mapping[str, frozenset[str]],
     ) -> Vocabulary:
         """Collect the names in triples of ontologies, and those that their structure uses (see
         Content); the individuals are further ones, that exist only in states.
         """
-        texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
+        texts = dict.fromkeys(enumerations, frozenset((rdf.STRING,)))
         literals = [(p, o) for _, p, o in triples if isinstance(o, Lit)]
         return cls(
             kinds=_kinds(triples, individuals),
@@ -86,7 +86,8 @@ class Vocabulary:
 
     def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
         """Add what the heads of rules use."""
-        used, whole = set(self.used), set(self.whole)
+        used = {*self.used}
+        whole = {*self.whole}
         for atom in (atom for rule in rules for atom in rule.head):
             used |= {atom.predicate, *(t.iri for t in atom.arguments if isinstance(t, Named))}
             # A variable may stand for a whole number.
@@ -135,7 +136,7 @@ class Vocabulary:
         return nearest(bare, known)
 
 
-def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
+def _kinds(triples: Iterable[Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
     """What each name is declared as or used as; further individuals are given."""
     kinds: dict[str, set[str]] = defaultdict(set)
     kinds[rdf.OWL + "Thing"].add("class")
@@ -153,7 +154,7 @@ def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[st
     return {iri: frozenset(found) for iri, found in kinds.items()}
 
 
-def _ranges(triples: Iterable[rdf.Triple]) -> dict[str, frozenset[str]]:
+def _ranges(triples: Iterable[Triple]) -> dict[str, frozenset[str]]:
     """The datatype of each property that has one range.
 
     All ranges of a property hold at once; which values several of them leave is not worked out.
@@ -176,7 +177,7 @@ class Problem(NamedTuple):
 
     place: Place | None
     message: str
-    remedy: str | None
+    remedy: str | None = None
     is_fatal: bool = True
 
 
@@ -223,11 +224,11 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
     Raises:
         RuleError: it cannot; with line and column.
     """
-    for each in fatal_problems(rule, vocabulary):
-        place = f"line {each.line}, column {each.column}" if each.column else f"line {rule.line}"
-        raise RuleError(
-            f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy
-        )
+    for place, message, remedy, is_fatal in rule_problems(rule, vocabulary):
+        if is_fatal:
+            where = str(place or f"line {rule.line}")
+            problem = f"rule {rule.name}: {message}"
+            raise RuleError(problem, file=rule.file, place=where, remedy=remedy)
     return rule
 
 
@@ -256,7 +257,7 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit) and not rdf.is_well_formed(term):
             words = f"{term.text!r} is not an xsd:{local_name(term.datatype)}"
-            yield Problem(atom.place(number), words, None)
+            yield Problem(atom.place(number), words)
             return
     if atom.kind == "builtin":
         yield from _builtin_problems(atom, name, is_head=is_head)
@@ -265,7 +266,7 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
         return
     elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
         words = "one argument" if wanted == 1 else "two arguments"
-        yield Problem(atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None)
+        yield Problem(atom.place(), f"{name} takes {words}, not {len(atom.arguments)}")
         return
     for number, term in enumerate(atom.arguments):
         yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
@@ -276,8 +277,7 @@ def _predicate_problem(
 ) -> Problem | None:
     """Check that a class, property or datatype can hold of something, and is used as declared."""
     if "" in (atom.kind, atom.predicate):
-        words = "an atom without a kind that SWRL knows, or without a name"
-        return Problem(atom.place(), words, None)
+        return Problem(atom.place(), "an atom without a kind that SWRL knows, or without a name")
     if atom.kind == "range":
         return _range_problem(atom, name, vocabulary, is_head=is_head)
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
@@ -292,7 +292,7 @@ def _predicate_problem(
         return Problem(atom.place(), words, f"write {name}(?x)")
     found = max(declared.intersection(_PROPERTIES), default=min(declared))
     words = f"{name} is {with_article(found)}, but is used as {with_article(wanted)}"
-    return Problem(atom.place(), words, None)
+    return Problem(atom.place(), words)
 
 
 def _undefined(atom: Atom, wanted: str, vocabulary: Vocabulary) -> Problem:
@@ -326,7 +326,7 @@ def _argument_problems(
     takes_value = atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
         words = f"{name}: {swrl.write_term(term)} is a value, but an individual is needed"
-        yield Problem(place, words, None)
+        yield Problem(place, words)
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
@@ -359,7 +359,7 @@ def _value_problems(
         wanted = " or ".join(sorted(map(local_name, ranges)))
         words = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
         remedy = f"a value of {wanted}"
-        if term.datatype in rdf.WHOLE and rdf.XSD + "decimal" in ranges:
+        if term.datatype in rdf.WHOLE and rdf.DECIMAL in ranges:
             remedy = f"write {term.text}.0"
         yield Problem(place, words, remedy, is_head)
     elif term.text not in values:
@@ -415,7 +415,7 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
-        yield Problem(place, f"?{name} stands for an individual and for a value", None)
+        yield Problem(place, f"?{name} stands for an individual and for a value")
     bound = _bound_in(rule)
     testing = [atom for atom in rule.body if atom.kind in ("builtin", "range")]
     for atom, number, name in variable_uses(testing):
@@ -490,11 +490,8 @@ def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
     Raises:
         RuleError: a name is unknown or ambiguous; with line and column.
     """
-    body, head = (
-        tuple(_resolved(atom, vocabulary, rule.file) for atom in side)
-        for side in (rule.body, rule.head)
-    )
-    return replace(rule, body=body, head=head)
+    resolved = partial(_resolved, vocabulary=vocabulary, file=rule.file)
+    return replace(rule, body=tuple(map(resolved, rule.body)), head=tuple(map(resolved, rule.head)))
 
 
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
@@ -511,9 +508,7 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
         named(n, term.iri) if isinstance(term, Named) else term
         for n, term in enumerate(atom.arguments)
     )
-    return replace(
-        atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments
-    )
+    return Atom(_kind(predicate, arguments, vocabulary), predicate, arguments, atom.places)
 
 
 def _iri(
@@ -543,7 +538,7 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     """Return the kind of an atom's name: as declared if possible, otherwise as its arguments
     suggest.
     """
-    if predicate in (swrl.SAME, swrl.DIFFERENT):
+    if predicate in swrl.IDENTITIES:
         return "same" if predicate == swrl.SAME else "different"
     if predicate.startswith(rdf.SWRLB):
         return "builtin"
@@ -554,10 +549,11 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
         return "range"
     if len(arguments) < 2:
         return "class"
-    used_for = declared & {"data property", "object property"}
+    takes_value = isinstance(arguments[1], Lit)
+    used_for = declared.intersection(_PROPERTIES)
     if len(used_for) == 1:
-        return "data" if "data property" in used_for else "object"
-    return "data" if isinstance(arguments[1], Lit) else "object"
+        takes_value = "data property" in used_for
+    return "data" if takes_value else "object"
 
 
 _IMP = rdf.SWRL + "Imp"
@@ -572,6 +568,7 @@ _PREDICATE_OF = {
 }
 _NAMES: Mapping[str, str] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
 _CLASS_OF = {kind: name for name, kind in swrl.ATOM_KINDS.items()}
+
 #: Ends the names that rules without one get.
 WITHOUT_NAME = "without a name"
 #: Begins the IRIs given to variables, as Protégé does.
@@ -605,9 +602,10 @@ def _read_rule(file: OntologyFile, node: str) -> Rule:
     return Rule("", body, head, enabled, file.path, triples=triples, undeclared=undeclared)
 
 
-def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
+def _closure(file: OntologyFile, start: str) -> Iterator[Triple]:
     """The triples of a rule: its own, and those of its lists and atoms, in a fixed order."""
-    waiting, seen = [start], {start}
+    waiting = [start]
+    seen = {start}
     while waiting:
         for triple in sorted(file.about(waiting.pop()), key=lambda triple: triple[1]):
             yield triple
@@ -674,22 +672,21 @@ def _read_term(
     return Variable(names[term])
 
 
-def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
+def triples_of(rule: Rule) -> Sequence[Triple]:
     """The RDF of a rule, which begins with its node: as an ontology has it, or as one would."""
     if rule.triples:
         return rule.triples
-    label = Lit(rule.name, rdf.XSD + "string")
-    triples: list[rdf.Triple] = [
-        ("_:rule", rdf.RDF_TYPE, _IMP),
-        ("_:rule", rdf.RDFS + "label", label),
+    node = "_:rule"
+    triples: list[Triple] = [
+        (node, rdf.RDF_TYPE, _IMP),
+        (node, rdf.RDFS + "label", Lit(rule.name, rdf.STRING)),
     ]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
         triples.append((_VARIABLES + variable, rdf.RDF_TYPE, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append(
-            ("_:rule", rdf.SWRL + side, _write_list(nodes, rdf.SWRL + "AtomList", triples))
-        )
+        items = _write_list(nodes, rdf.SWRL + "AtomList", triples)
+        triples.append((node, rdf.SWRL + side, items))
     return triples
 
 
@@ -699,7 +696,7 @@ def _write_term(term: Term) -> str | Lit:
     return term.iri if isinstance(term, Named) else _VARIABLES + term.name
 
 
-def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
+def _write_atom(atom: Atom, triples: list[Triple]) -> str:
     node = f"_:atom{len(triples)}"
     triples.append((node, rdf.RDF_TYPE, _CLASS_OF[atom.kind]))
     if atom.kind in _PREDICATE_OF:
@@ -709,9 +706,8 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
         triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], predicate))
         triples += of_atom
     if atom.kind == "builtin":
-        arguments = _write_list(
-            [_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples
-        )
+        terms = [_write_term(term) for term in atom.arguments]
+        arguments = _write_list(terms, rdf.RDF + "List", triples)
         triples.append((node, rdf.SWRL + "arguments", arguments))
     else:
         for number, term in enumerate(atom.arguments[:2], start=1):
@@ -719,7 +715,7 @@ def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
     return node
 
 
-def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]) -> str:
+def _write_list(items: Sequence[str | Lit], kind: str, triples: list[Triple]) -> str:
     rest = rdf.RDF + "nil"
     for item in reversed(items):
         node = f"_:list{len(triples)}"
