@@ -29,6 +29,7 @@ from suave_des.knowledge.resolver import Sources, as_written, is_metamodel
 from suave_des.knowledge.rules import (
     NOT_THE_SAME,
     Atom,
+    AtomKind,
     Named,
     Place,
     Rule,
@@ -47,6 +48,8 @@ from suave_des.knowledge.rules.files import (
     variable_uses,
 )
 from suave_des.resources import shipped_folder, shown_name
+
+Findings = Iterator[Finding]
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,12 @@ class Material:
         level = Level.WARN if self.is_own(rule) else Level.NOTE
         return about_rule(rule, message, place, remedy, level)
 
+    def wrong_atom(
+        self, rule: Rule, atom: Atom, problem: str, remedy: str | None = None
+    ) -> Finding:
+        """Make a finding about an atom of a rule, whose text it begins with."""
+        return self.suspicious(rule, atom.place(), f"{write_atom(atom)} {problem}", remedy)
+
 
 def _schema_steps(triples: Iterable[rdf.Triple]) -> list[tuple[str, str]]:
     """Each class or property with those to which its members or values lead."""
@@ -251,7 +260,7 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
 # The files.
 
 
-def imports(material: Material) -> Iterator[Finding]:
+def imports(material: Material) -> Findings:
     """Note which files supply what the user's files import, in one line for each of these."""
     shipped = shipped_folder("ontology")
     by_file: dict[Path, list[str]] = defaultdict(list)
@@ -271,7 +280,7 @@ _ABOUT_CLASSES = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
 _PROPERTIES = ("object property", "data property", "annotation property")
 
 
-def values(material: Material) -> Iterator[Finding]:
+def values(material: Material) -> Findings:
     """Find the values that no state can be compared with, or that contradict one another."""
     for subject, problem, remedy in wrong_values(material.base.stated):
         yield material.about(
@@ -279,7 +288,7 @@ def values(material: Material) -> Iterator[Finding]:
         )
 
 
-def undefined_names(material: Material) -> Iterator[Finding]:
+def undefined_names(material: Material) -> Findings:
     """Find the classes, properties and individuals that are used and defined nowhere: most are
     misspelt.
 
@@ -327,22 +336,21 @@ class _Described:
         subject, predicate, value = triple
         if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
             return self._undefined_class(predicate, value)
-        if predicate.startswith(rdf.LANGUAGE_NAMESPACES) or (subject, predicate) in self._assumed:
+        if not rdf.is_thing(predicate) or (subject, predicate) in self._assumed:
             return None
         if predicate not in self._described:
             return _Used("property", predicate, _PROPERTIES)
-        if value in self._described or "object property" not in self._kinds.get(predicate, ()):
-            return None
-        if _is_of_language(value):
-            return None
-        return _Used(local_name(predicate), str(value), ("individual",))
+        leads_to_things = "object property" in self._kinds.get(predicate, ())
+        if leads_to_things and rdf.is_thing(value) and value not in self._described:
+            return _Used(local_name(predicate), value, ("individual",))
+        return None
 
     def _undefined_class(self, predicate: str, value: str | Lit) -> _Used | None:
         wanted = {"class", "datatype"} if predicate == rdf.RDFS + "range" else {"class"}
-        if _is_of_language(value) or wanted & self._kinds.get(str(value), frozenset()):
+        if not rdf.is_thing(value) or wanted & self._kinds.get(value, frozenset()):
             return None
         words = "class" if predicate == rdf.RDF_TYPE else local_name(predicate)
-        return _Used(words, str(value), ("class",))
+        return _Used(words, value, ("class",))
 
     def nearest(self, used: _Used, subject: str) -> str | None:
         """Ask whether another name was meant: of the same last part, else the most similar one."""
@@ -357,12 +365,7 @@ class _Described:
         return nearest(local_name(used.iri), map(local_name, known))
 
 
-def _is_of_language(value: str | Lit) -> bool:
-    """Whether a value is a literal, or a term of OWL, RDF, SWRL or the like."""
-    return isinstance(value, Lit) or value.startswith(rdf.LANGUAGE_NAMESPACES)
-
-
-def functions_without_design(material: Material) -> Iterator[Finding]:
+def functions_without_design(material: Material) -> Findings:
     """Find the functions that have no design, or that the mission needs and that are not there."""
     needed = {*material.subject.needed}
     for level, names in (
@@ -373,16 +376,17 @@ def functions_without_design(material: Material) -> Iterator[Finding]:
             yield material.about(level, name, problem, remedy)
 
 
-def designs_and_modes(material: Material) -> Iterator[Finding]:
+def designs_and_modes(material: Material) -> Findings:
     """Find the function designs that no mode has the name of, and the modes that metacontrol never
     chooses.
     """
+    known = material.subject.modes
+    if known is None:
+        return
     otherwise = "add a mode of this name to the System Modes file, or remove the design"
-    for function in sorted(
-        material.base.model.functions if material.subject.modes is not None else ()
-    ):
+    for function in sorted(material.base.functions):
         designs = {*material.base.designs(function)}
-        modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
+        modes = {*known.get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
         for design in sorted(designs - modes):
             problem = f"function design {design} has no mode of the same name for {function}"
             yield material.about(
@@ -393,7 +397,7 @@ def designs_and_modes(material: Material) -> Iterator[Finding]:
             yield material.about(Level.NOTE, function, problem)
 
 
-def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
+def attributes_that_do_not_fit(material: Material) -> Findings:
     """Find quality attributes that missions measure and ontologies lack, or compare with
     nothing.
     """
@@ -416,7 +420,7 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
             yield material.about(Level.WARN, name, problem, remedy)
 
 
-def values_that_are_not_used(material: Material) -> Iterator[Finding]:
+def values_that_are_not_used(material: Material) -> Findings:
     """Find values that ontologies give of measurements, in whose place missions have others."""
     valued = rdf.subjects(material.content.triples, rdf.HAS_VALUE)
     for name, iri in material.base.model.measurements.items():
@@ -425,7 +429,7 @@ def values_that_are_not_used(material: Material) -> Iterator[Finding]:
             yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
 
-def attributes_declared_twice(material: Material) -> Iterator[Finding]:
+def attributes_declared_twice(material: Material) -> Findings:
     """Find the quality attribute types that several files declare: what each of them says of one
     holds.
     """
@@ -438,7 +442,7 @@ def attributes_declared_twice(material: Material) -> Iterator[Finding]:
             yield Finding(Level.WARN, problem, *place, remedy="declare it in one of them")
 
 
-def unknown_to_missions(material: Material) -> Iterator[Finding]:
+def unknown_to_missions(material: Material) -> Findings:
     """Note the components whose status nothing reports, and the attributes that designs expect and
     nothing measures.
     """
@@ -475,18 +479,20 @@ def _expected(model: Model) -> frozenset[str]:
     return frozenset().union(*model.estimated.values()) - {local_name(rdf.PERFORMANCE)}
 
 
-def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
+def thresholds_without_reaction(material: Material) -> Findings:
     """Find the search designs whose expected visibility the metric of reactions does not know."""
     known = material.subject.reaction_thresholds_m
-    for design in material.base.designs(GENERATE_SEARCH_PATH) if known is not None else ():
+    if known is None:
+        return
+    for design in material.base.designs(GENERATE_SEARCH_PATH):
         expected_m = material.base.expected(design).get(WATER_VISIBILITY)
-        if expected_m is not None and float(expected_m) not in (known or ()):
+        if expected_m is not None and float(expected_m) not in known:
             problem = f"{design} expects {expected_m} m of visibility, which is not a threshold of mean_reaction_time_s"
             remedy = "set reaction_metric.visibility_thresholds_m and expected_altitudes_m"
             yield material.about(Level.WARN, design, problem, remedy)
 
 
-def assumed_operators(material: Material) -> Iterator[Finding]:
+def assumed_operators(material: Material) -> Findings:
     """Note which comparison operators are assumed."""
     return (
         material.about(Level.NOTE, name, words) for name, words in material.base.assumptions.items()
@@ -497,11 +503,11 @@ def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of
     2023 do.
     """
-    heads = [(rule, atom) for rule in base.content.enabled_rules for atom in rule.head]
-    updatable = Lit("UPDATABLE", rdf.XSD + "string")
+    updatable = Lit("UPDATABLE", rdf.STRING)
     return [
         (rule, atom)
-        for rule, atom in heads
+        for rule in base.content.enabled_rules
+        for atom in rule.head
         if atom.predicate == rdf.O_STATUS and updatable in atom.arguments
     ]
 
@@ -530,7 +536,7 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
         )
 
 
-def another_revision(material: Material) -> Iterator[Finding]:
+def another_revision(material: Material) -> Findings:
     """Find ontologies of revision 2023 in a scenario of another one."""
     try:
         check_revision(material.base, material.subject.measured or (), material.subject.revision)
@@ -541,7 +547,7 @@ def another_revision(material: Material) -> Iterator[Finding]:
 # Rules that Pellet would ignore, or that never fire.
 
 
-def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
+def mistakes_that_pellet_ignores(material: Material) -> Findings:
     """Find what Pellet would drop or ignore without a word."""
     for rule in material.rules:
         if rule not in material.for_other_models:
@@ -552,10 +558,10 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
                     yield material.suspicious(rule, place, message, remedy)
 
 
-_TEXTS = rdf.terms(rdf.XSD, "string boolean")
+_TEXTS = {rdf.STRING, rdf.BOOLEAN}
 
 
-def never_comparable(material: Material) -> Iterator[Finding]:
+def never_comparable(material: Material) -> Findings:
     """Find comparisons of a number with a text or a truth value, which hold for no values."""
     ranges = material.base.vocabulary.ranges
     for rule in material.rules:
@@ -565,24 +571,21 @@ def never_comparable(material: Material) -> Iterator[Finding]:
             if atom.kind == "data" and len(atom.arguments) == 2
         }
         for atom in rule.body:
-            place = _compared_text(atom, datatypes)
-            if place is not None:
+            for place in _compared_texts(atom, datatypes):
                 term = atom.arguments[place]
                 problem = f"{swrl.write_term(term)} is no number, and never compares with one"
                 remedy = "write numbers without quotes" if isinstance(term, Lit) else None
                 yield material.suspicious(rule, atom.place(place), problem, remedy)
 
 
-def _compared_text(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> int | None:
-    """The place of a text or truth value that an atom compares with a number; None: there is
-    none.
-    """
+def _compared_texts(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> Iterator[int]:
+    """The place of a text or truth value that an atom compares with a number, if it does."""
     if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
-        return None
+        return
     kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
-    numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
-    texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
-    return texts.index(True) if True in texts and True in numbers else None
+    for place, (kind, other) in enumerate(zip(kinds, reversed(kinds), strict=True)):
+        if kind and other and kind <= _TEXTS and other <= rdf.NUMERIC:
+            yield place
 
 
 def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset[str]:
@@ -590,20 +593,16 @@ def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset
     return frozenset({term.datatype}) if isinstance(term, Lit) else known.get(term, frozenset())
 
 
-def literals_of_expressions(material: Material) -> Iterator[Finding]:
+def literals_of_expressions(material: Material) -> Findings:
     """Find literals in class expressions and data ranges that are none of their datatype."""
     for source in material.base.sources:
         for subject, _, value in source.triples:
-            if (
-                subject.startswith("_:")
-                and isinstance(value, Lit)
-                and not rdf.is_well_formed(value)
-            ):
+            if rdf.is_node(subject) and isinstance(value, Lit) and not rdf.is_well_formed(value):
                 problem = f"a class expression has {value.text!r}, which is not an xsd:{local_name(value.datatype)}"
                 yield Finding(Level.ERROR, problem, str(source.path))
 
 
-def undeclared_terms(material: Material) -> Iterator[Finding]:
+def undeclared_terms(material: Material) -> Findings:
     """Find what rules use and no ontology declares, which a reasoner takes all the same."""
     vocabulary = material.base.vocabulary
     for rule in material.rules:
@@ -630,7 +629,7 @@ def undeclared_terms(material: Material) -> Iterator[Finding]:
                 )
 
 
-def shared_names(material: Material) -> Iterator[Finding]:
+def shared_names(material: Material) -> Findings:
     """Find rules of one name, other than those of TOMASys and mros, and those that replace another
     one.
     """
@@ -643,9 +642,8 @@ def shared_names(material: Material) -> Iterator[Finding]:
     }
     for rule in rules:
         if names[rule.name] > 1 and rule.name in own:
-            yield material.suspicious(
-                rule, None, f"{names[rule.name]} rules have this name", "rename one"
-            )
+            problem = f"{names[rule.name]} rules have this name"
+            yield material.suspicious(rule, None, problem, "rename one")
     for old, new in material.content.replaced:
         if (old.text, old.enabled) != (new.text, new.enabled):
             problem = f"replaces the rule of this name in {relative_path(old.file)}"
@@ -654,7 +652,7 @@ def shared_names(material: Material) -> Iterator[Finding]:
             )
 
 
-def for_other_models(material: Material) -> Iterator[Finding]:
+def for_other_models(material: Material) -> Findings:
     """Note the rules of TOMASys and mros that need what this model does not have, a file in one
     line.
     """
@@ -722,7 +720,7 @@ def attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
                 yield atom, attribute.iri
 
 
-def never_fires(material: Material) -> Iterator[Finding]:
+def never_fires(material: Material) -> Findings:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
     told = list(material.for_other_models)
     dead = [
@@ -739,47 +737,46 @@ def never_fires(material: Material) -> Iterator[Finding]:
 _MAKE_DIFFERENT = re.compile(rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
 
 
-def equal_individuals(material: Material) -> Iterator[Finding]:
+def equal_individuals(material: Material) -> Findings:
     """Find rules that ask for different individuals (differentFrom), where nothing makes any
     different.
 
     Values of functional properties can, so such a rule is suspicious, not dead.
     """
     heads = {atom.kind for atom in material.content.conclusions}
-    if any(map(_MAKE_DIFFERENT.match, material.terms)) or "different" in heads:
-        return
-    remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+    if not any(map(_MAKE_DIFFERENT.match, material.terms)) and "different" not in heads:
+        needs = "needs individuals that are declared different; different names are not enough"
+        remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+        yield from _asking_for(material, "different", needs, remedy)
+
+
+def _asking_for(
+    material: Material, kind: AtomKind, problem: str, remedy: str | None = None
+) -> Findings:
+    """Find atoms of a kind in the bodies of rules."""
     for rule in material.rules:
         for atom in rule.body:
-            if atom.kind == "different":
-                needs = (
-                    "needs individuals that are declared different; different names are not enough"
-                )
-                yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
+            if atom.kind == kind:
+                yield material.wrong_atom(rule, atom, problem, remedy)
 
 
-def identities_of_names(material: Material) -> Iterator[Finding]:
+def identities_of_names(material: Material) -> Findings:
     """Find rules that ask about identity with nothing but names, as knowledge.rules says."""
     remedy = "add an atom about these individuals, such as their class"
     for rule in material.rules:
         for atom in rule.identities_of_names:
-            problem = f"{write_atom(atom)} {NOT_THE_SAME}"
-            yield material.suspicious(rule, atom.place(), problem, remedy)
+            yield material.wrong_atom(rule, atom, NOT_THE_SAME, remedy)
 
 
 #: Axioms by which individuals that have different names can be the same.
 _MAKE_SAME = re.compile(rdf.OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
 
 
-def same_individuals(material: Material) -> Iterator[Finding]:
+def same_individuals(material: Material) -> Findings:
     """Find rules that ask for the same individuals (sameAs), where nothing makes any the same."""
-    if _can_be_the_same(material):
-        return
-    for rule in material.rules:
-        for atom in rule.body:
-            if atom.kind == "same":
-                problem = f"{write_atom(atom)} holds of an individual and itself only: nothing says that two names mean one"
-                yield material.suspicious(rule, atom.place(), problem)
+    if not _can_be_the_same(material):
+        problem = "holds of an individual and itself only: nothing says that two names mean one"
+        yield from _asking_for(material, "same", problem)
 
 
 def _can_be_the_same(material: Material) -> bool:
@@ -797,7 +794,7 @@ def _can_be_the_same(material: Material) -> bool:
 # Rules that cannot mean what their author wanted.
 
 
-def misspelt_variables(material: Material) -> Iterator[Finding]:
+def misspelt_variables(material: Material) -> Findings:
     """Find variables that occur once, and whose name is nearly that of another."""
     for rule in material.rules:
         places: dict[str, list[Place | None]] = defaultdict(list)
@@ -840,7 +837,7 @@ def are_near(one: str, other: str) -> bool:
     return has_same_ends and is_word and similar(one, [other], cutoff=0.8) is not None
 
 
-def two_values(material: Material) -> Iterator[Finding]:
+def two_values(material: Material) -> Findings:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
     functional = rdf.members(material.content.triples, [rdf.FUNCTIONAL])
     for rule in material.rules:
@@ -861,7 +858,7 @@ def two_values(material: Material) -> Iterator[Finding]:
 
 def _changed_values(
     material: Material, rule: Rule, asked: Mapping[tuple[str, Term], Term]
-) -> Iterator[Finding]:
+) -> Findings:
     """Find the conclusions of a rule that give another value to what its body asks for."""
     comparing = [atom for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "="]
     equated = {term for atom in comparing for term in atom.arguments}
@@ -870,11 +867,8 @@ def _changed_values(
         if atom.kind != "data" or before is None or before in equated:
             continue
         if not _same(before, atom.arguments[-1]):
-            name = local_name(atom.predicate)
-            problem = f"{write_atom(atom)} contradicts {name} in the body, which holds as well"
-            yield material.suspicious(
-                rule, atom.place(), problem, "rules add facts, and change none"
-            )
+            problem = f"contradicts {local_name(atom.predicate)} in the body, which holds as well"
+            yield material.wrong_atom(rule, atom, problem, "rules add facts, and change none")
 
 
 def _same(one: Term, other: Term) -> bool:
@@ -887,20 +881,22 @@ def _same(one: Term, other: Term) -> bool:
 _FD_REALISABILITY = rdf.TOMASYS + "fd_realisability"
 
 
-def no_effect(material: Material) -> Iterator[Finding]:
+def no_effect(material: Material) -> Findings:
     """Find rules that conclude that a design is realisable, which no decision asks."""
     if any(atom.predicate == _FD_REALISABILITY for rule in material.rules for atom in rule.body):
         return
+    problem = (
+        "fd_realisability true has no effect: a design counts as realisable unless it is false"
+    )
+    remedy = "write the opposite condition, and conclude false"
     for rule in material.rules:
         for atom in rule.head:
             term = atom.arguments[-1] if atom.predicate == _FD_REALISABILITY else None
             if isinstance(term, Lit) and term.text in ("true", "1"):
-                problem = "fd_realisability true has no effect: a design counts as realisable unless it is false"
-                remedy = "write the opposite condition, and conclude false"
                 yield material.suspicious(rule, atom.place(), problem, remedy)
 
 
-def misspelt_statuses(material: Material) -> Iterator[Finding]:
+def misspelt_statuses(material: Material) -> Findings:
     """Find the user's rules that ask for a component's status that is nearly one that the
     simulation reports.
 
@@ -911,7 +907,7 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
     known = reported | _other_statuses(material)
     for rule in filter(material.is_own, material.rules):
         for atom, status in _statuses_asked(rule):
-            if isinstance(status, Lit) and status.datatype == rdf.XSD + "string":
+            if isinstance(status, Lit) and status.datatype == rdf.STRING:
                 meant = similar(status.text.upper(), by_capitals)
                 if status.text not in known and meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
@@ -922,8 +918,8 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
 def _other_statuses(material: Material) -> set[str]:
     """The statuses of components that an ontology asserts or a rule concludes."""
     found: list[Term | str] = [o for _, p, o in material.content.triples if p == rdf.C_STATUS]
-    for rule in material.rules:
-        found += [atom.arguments[-1] for atom in rule.head if atom.predicate == rdf.C_STATUS]
+    heads = material.content.conclusions
+    found += [atom.arguments[-1] for atom in heads if atom.predicate == rdf.C_STATUS]
     return {value.text for value in found if isinstance(value, Lit)}
 
 

@@ -33,6 +33,7 @@ from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import (
+    DECIMAL,
     HAS_VALUE,
     OWL,
     RDFS,
@@ -61,7 +62,7 @@ from suave_des.knowledge.state import (
 )
 
 _SAME_VALUES = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
-_BINARY = rdf.terms(XSD, "float double")
+
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
 _SIZELESS = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
 _SIZES = rdf.terms(XSD, "minInclusive minExclusive maxInclusive maxExclusive")
@@ -134,7 +135,7 @@ def regions_of(ontology: Ontology) -> Regions:
     thresholds = sorted(
         exact(number) for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT
     )
-    binary = [where for where, value in literals if value.datatype in _BINARY]
+    binary = [where for where, value in literals if value.datatype in rdf.BINARY]
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology)])))
 
@@ -165,7 +166,7 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for name, kind in rdf.links(triples, RDFS + "range"):
-        if name in carriers and kind != XSD + "decimal":
+        if name in carriers and kind != DECIMAL:
             yield f"{local_name(name)} has a range other than decimal"
     for name in sorted(rdf.members(triples, [RDFS + "Datatype"])):
         yield f"the ontology defines a datatype, {local_name(name)}"
