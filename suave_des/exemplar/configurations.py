@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, Field, Json
 
@@ -161,9 +161,7 @@ def _only_in_a_campaign(runner: Runner) -> str:
 # Thruster events, as text.
 
 
-_BEFORE_START: Final = re.compile(
-    r"(\(\d+,\w+,)(-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\)", re.ASCII
-)
+_BEFORE_START = re.compile(r"(\(\d+,\w+,)(-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\)", re.ASCII)
 
 
 def _time_before_start_s(event: object) -> float | None:

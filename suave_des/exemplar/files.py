@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from suave_des.errors import InputError, did_you_mean
 from suave_des.exemplar.keys import (
@@ -19,7 +19,7 @@ from suave_des.scenario.modes import modes_of
 from suave_des.scenario.yamlfile import Layer, read_yaml
 
 PARAMETERS = "ros__parameters"
-EVENTS: Final = "thruster_events"
+EVENTS = "thruster_events"
 _BATCHES = ("run_batch", "suave_cli")
 """The exemplar's programs that run what a file of their own describes."""
 

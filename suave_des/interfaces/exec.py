@@ -24,7 +24,7 @@ from itertools import chain
 from math import inf
 from operator import attrgetter
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar
 from weakref import WeakSet, finalize
 
 from suave_des.clock import call_at, until
@@ -35,29 +35,29 @@ from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSub
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 
-PROTOCOL: Final = 1
+PROTOCOL = 1
 """Version of the messages; a program of another version is refused."""
-LINE_LIMIT_BYTES: Final = 1_000_000
-TIME_OUT_S: Final = 10.0
+LINE_LIMIT_BYTES = 1_000_000
+TIME_OUT_S = 10.0
 """So long a program may take for an answer; the setting `time_out_s` changes it."""
-_LONGEST_S: Final = 1e6
+_LONGEST_S = 1e6
 """Of thinking."""
-_END_S: Final = 1.0
-_LOOK_S: Final = 1.0
+_END_S = 1.0
+_LOOK_S = 1.0
 """Longest wait for a program: one that took twice as long was one in which this process was stopped.
 """
-_READ_BYTES: Final = 65536
-_KILLS_AT_END_OF_INPUT: Final = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
-KINDS: Final = {
+_READ_BYTES = 65536
+_KILLS_AT_END_OF_INPUT = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
+KINDS = {
     "measured": Kind.QA_STATUS,
     "component_status": Kind.COMPONENT_STATUS,
     "pose": Kind.POSE,
     "distance": Kind.DISTANCE,
 }
-_NAMES: Final = {kind: name for name, kind in KINDS.items()}
-_ANSWER: Final = ("modes", "log", "latency_s")
-_OWN_SETTINGS: Final = ("time_out_s", "real_thinking")
-_FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
+_NAMES = {kind: name for name, kind in KINDS.items()}
+_ANSWER = ("modes", "log", "latency_s")
+_OWN_SETTINGS = ("time_out_s", "real_thinking")
+_FIRST_ANSWER = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
 
 
 class ProgramError(Exception):

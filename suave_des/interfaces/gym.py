@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,11 +29,11 @@ from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
-NOT_MEASURED: Final = -1.0
-DRAWN_SEED_LIMIT: Final = 2**31
-_SPREADS: Final = 6.0
+NOT_MEASURED = -1.0
+DRAWN_SEED_LIMIT = 2**31
+_SPREADS = 6.0
 """So many standard deviations are taken for the bounds of a normal distribution that has none."""
-REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
+REWARD = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
 """Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding
 the pipeline, and an adaptation. A metre earns what 10 s of search cost; a mission gives about -10
 to 60."""

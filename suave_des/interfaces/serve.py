@@ -17,7 +17,7 @@ from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit
 
 from suave_des.domain import THRUSTER_NAMES
@@ -27,17 +27,17 @@ from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
-BODY_LIMIT_BYTES: Final = 100_000
-_READ_TIMEOUT_S: Final = 10.0
-_LENGTH_DIGITS: Final = 20
-_MOST_REPORTS: Final = 20
-_LOCAL: Final = ("localhost", "127.0.0.1", "::1")
-_JSON: Final = "application/json"
+BODY_LIMIT_BYTES = 100_000
+_READ_TIMEOUT_S = 10.0
+_LENGTH_DIGITS = 20
+_MOST_REPORTS = 20
+_LOCAL = ("localhost", "127.0.0.1", "::1")
+_JSON = "application/json"
 ADVANCE, LATENCY = "advance_s", "latency_s"
-_LONGEST_S: Final = 1e6
-_FIRST_S: Final = 1e-9
+_LONGEST_S = 1e6
+_FIRST_S = 1e-9
 """The mission time at which a client first sees it: the first task is requested at t = 0."""
-REQUESTS: Final = {
+REQUESTS = {
     "GET /": "this list",
     "GET /monitor": "what the mission's state is; null: not measured yet",
     "GET /monitor_schema": "JSON schema of the answer of /monitor, with what each name means",
@@ -51,7 +51,7 @@ REQUESTS: Final = {
     "GET /metrics": "a row of runs.csv",
 }
 """What a session answers; bodies are JSON."""
-_MEANINGS: Final = {
+_MEANINGS = {
     "time_s": "mission time",
     "is_over": "whether the mission has ended",
     "task": "the current task; empty: none",

@@ -314,6 +314,10 @@ _STATE_PROPERTIES = rdf.terms(
 )
 
 
+Iris = Mapping[str, str]
+"""IRIs by name."""
+
+
 @dataclass(frozen=True)
 class Model:
     """The named things of an ontology that states are made of.
@@ -329,13 +333,13 @@ class Model:
             value, sorted, each with the smallest one; None where that is no number.
     """
 
-    functions: Mapping[str, str]
-    designs: Mapping[str, str]
-    components: Mapping[str, str]
-    attributes: Mapping[str, str]
-    objectives: Mapping[str, str]
-    groundings: Mapping[str, str]
-    measurements: Mapping[str, str]
+    functions: Iris
+    designs: Iris
+    components: Iris
+    attributes: Iris
+    objectives: Iris
+    groundings: Iris
+    measurements: Iris
     own: Mapping[str, tuple[Triple, ...]]
     estimated: Mapping[str, Mapping[str, Decimal | None]]
 
@@ -450,7 +454,7 @@ def _by_name(iris: Iterable[str], kind: str, sources: Sequence[OntologyFile]) ->
 
 def _in_states(
     triples: Sequence[Triple],
-    things: Mapping[str, str],
+    things: Iris,
     class_name: str,
     rename: Callable[[str], str],
     leading: str = "",
@@ -507,9 +511,7 @@ def _separated(
     return {iri: tuple(found) for iri, found in own.items()}, tuple(kept)
 
 
-def _estimated(
-    triples: Sequence[Triple], designs: Mapping[str, str]
-) -> dict[str, dict[str, Decimal | None]]:
+def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, Decimal | None]]:
     """Return the smallest expected value of each quality attribute, by the design's name."""
     numbers = {
         subject: Decimal(value.text.strip())
