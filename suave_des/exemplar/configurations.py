@@ -234,7 +234,8 @@ class Reading(NamedTuple):
         if path == "":
             return _NOT_NEEDED
         if not is_read(parameter.node, parameter.name, self.revision):
-            instead = (f"{key.node}.{key.name}" for key in self._keys() if key.path == path)
+            keys = read_by(self.revision)
+            instead = (f"{key.node}.{key.name}" for key in keys if key.path == path)
             return f"revision {self.revision} reads {next(instead, 'nothing of the kind')}"
         if path in self.passed and parameter.node != RUNNER:
             return f"{RUNNER} gives each mission its own; without one, 0"
@@ -242,14 +243,11 @@ class Reading(NamedTuple):
 
     def defaults(self) -> Iterator[Key]:
         """Yield the keys that have a default, of nodes that take part in these missions."""
-        for key in self._keys():
+        for key in read_by(self.revision):
             takes_part = self.has_mission or (self.has_runner and key.node == RUNNER)
             is_passed = key.path in self.passed and key.node != RUNNER
             if key.default is not None and takes_part and not is_passed:
                 yield key
-
-    def _keys(self) -> tuple[Key, ...]:
-        return read_by(self.revision)
 
 
 def _values(
@@ -471,9 +469,8 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
     """The experiments, each by its own launch and mission; notes about what is not simulated."""
     parameter = runner.parameters["experiments"]
     for index, each in enumerate(runner.settings.experiments):
-        place = (
-            f"{parameter.document.path}: line {parameter.line(index)}, {parameter.keys}[{index}]"
-        )
+        line = parameter.line(index)
+        place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", each.experiment_launch))
         notes += _not_simulated(place, EXPERIMENT, json.loads(parameter.value[index]))
         notes += _not_simulated(place, LAUNCH, arguments)
@@ -543,7 +540,7 @@ def _battery_constraint(
         ]
         return {}
     level = next(iter(levels), None)
-    if level is None or level == 0.0:  # no level is below 0
+    if not level:  # no level is below 0
         return {}
     return {"battery.mission_ends_at_level": SourcedValue(level, "battery_constraint_value")}
 
@@ -606,8 +603,8 @@ def _campaign(
         )
         return entries
     if runner_seed is None:
-        return {**entries, **_drawn_anew(runner, drawn)}
-    return {**entries, **_conditions(runner, drawn, most, runner_seed, notes)}
+        return entries | _drawn_anew(runner, drawn)
+    return entries | _conditions(runner, drawn, most, runner_seed, notes)
 
 
 def _drawn_anew(runner: Runner, drawn: Sequence[Draw]) -> Entries:
@@ -622,7 +619,7 @@ def _drawn_anew(runner: Runner, drawn: Sequence[Draw]) -> Entries:
         }
         if each.is_event:
             value["shared"] = "thruster_events_shift"
-        entries["perturbations", each.path] = (value, each.source)
+        entries["perturbations", each.path] = value, each.source
     return entries
 
 
@@ -637,13 +634,13 @@ def _conditions(
         notes.append(f"--runner-seed: {last}, and {sharing} here, like the others")
     stream = random.Random(seed)
     # Of all, of empty intervals, too.
-    draws = [[stream.random() for _ in DRAWN] for _ in range(conditions)]
+    draws = [stream.random() for _ in range(conditions * len(DRAWN))]
     where = f"{runner.comment('experiments')}; at each of the conditions"
     entries: Entries = {("runs",): (min(runs, sharing), where)}
     for each in drawn:
-        values = [each.value(draw[each.number]) for draw in draws]
+        values = [each.value(share) for share in draws[each.number :: len(DRAWN)]]
         source = f"{each.source}, as Python draws from seed {seed}"
-        entries["sweep", "zip", each.path] = (values, source)
+        entries["sweep", "zip", each.path] = values, source
     return entries
 
 
@@ -722,7 +719,8 @@ _COMMENT_COLUMN = 43
 def _text(documents: Sequence[Layer], entries: Entries, notes: Sequence[str]) -> str:
     """A YAML file of these entries."""
     names = ", ".join(each.path.name for each in documents)
-    lines, above = [f"# Imported by `suave-des import-config` from {names}."], tuple[str, ...]()
+    lines = [f"# Imported by `suave-des import-config` from {names}."]
+    above: tuple[str, ...] = ()
     for path, (value, comment) in entries.items():
         for depth, key in enumerate(path[:-1]):
             if above[: depth + 1] != path[: depth + 1]:

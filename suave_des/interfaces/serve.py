@@ -348,9 +348,9 @@ class _Handler(BaseHTTPRequestHandler):
             answer = self.server.session.answer(method, path, content)
         except RefusedError as error:
             self.close_connection = True  # a body would not be read
-            status = error.args[0]
-            answer = {"error": error.args[1]}
-            self.server.senders.report(error.args[1])
+            status, problem = error.args
+            answer = {"error": problem}
+            self.server.senders.report(problem)
         except LookupError:
             known = f": it answers {' and '.join(allowed)}" if allowed else ""
             status = HTTPStatus.METHOD_NOT_ALLOWED if allowed else HTTPStatus.NOT_FOUND

@@ -221,7 +221,7 @@ def _states(
         needed = list(filter(task.__contains__, table.related(function)))
         designs = [(None, *table.designs.get(name, ())) for name in needed]
         objectives = [ObjectiveState(name, UNGROUNDED) for name in needed]
-        reported = _reports(table, loaded)
+        reported = _reports(table, loaded) if table.counts_reports else [()]
         for measured, reports, now in product(product(*values), reported, product(*designs)):
             yield KnowledgeState.of(
                 objectives,
@@ -261,9 +261,6 @@ def _reports(table: DecisionTable, loaded: LoadedScenario) -> Iterator[Reports]:
     """Yield what components can report: once a thruster has failed, recovering makes each
     report.
     """
-    if not table.counts_reports:
-        yield ()
-        return
     events = loaded.scenario.thruster_events
     failing = [THRUSTER_NAMES[each.thruster - 1] for each in events if each.event == "failure"]
     groups = _groups(table.settings.interchangeable)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain, takewhile
+from itertools import chain, filterfalse, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -143,7 +143,7 @@ class Material:
             waiting = [rule for rule in waiting if rule not in firing]
             held.update(atom.predicate for rule in firing for atom in rule.head)
             possible = rdf.reached(held, steps)
-        return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
+        return [(rule, next(filterfalse(allows, rule.body))) for rule in waiting]
 
     def _held_without_rules(self) -> set[str]:
         """The classes and properties of what the ontologies or a state may assert."""
@@ -326,9 +326,9 @@ class _Described:
         self._in_states = model.in_states
         self._kinds = material.base.vocabulary.kinds
         self._described = {subject for subject, _, _ in material.content.triples} | self._in_states
-        self._assumed = {
+        self._assumed = [
             (model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed
-        }
+        ]
         self.namespaces = {rdf.namespace(iri) for iri in self._described}
 
     def undefined_in(self, triple: rdf.Triple) -> _Used | None:
@@ -700,14 +700,12 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
     estimated = frozenset().union(*model.estimated.values())
     found: dict[str, tuple[str, str | None]] = {}
     for name in model.attributes:
+        so = f"{name}, so no grounding has a value of it"
         if name not in estimated:
-            problem = (
-                f"no function design has an estimate of {name}, so no grounding has a value of it"
-            )
-            found[name] = problem, f"add a hasQAestimation of type {name} to a design"
+            remedy = f"add a hasQAestimation of type {name} to a design"
+            found[name] = (f"no function design has an estimate of {so}", remedy)
         elif not material.measures(name):
-            problem = f"missions do not measure {name}, so no grounding has a value of it"
-            found[name] = problem, None
+            found[name] = (f"missions do not measure {so}", None)
     return found
 
 

@@ -519,14 +519,16 @@ def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, 
         if predicate == rdf.HAS_VALUE and _is_decimal(value)
     }
     types = {subject: local_name(kind) for subject, kind in rdf.links(triples, rdf.IS_QA_TYPE)}
+    links = rdf.links(triples, rdf.TOMASYS + "hasQAestimation")
+    given = [(design, value) for design, value in links if value in types]
+    # by quality attribute, and of one the smallest last, which replaces the others
+    given.sort(key=lambda each: (types[each[1]], -numbers.get(each[1], Decimal("inf"))))
     found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, value in rdf.links(triples, rdf.TOMASYS + "hasQAestimation"):
+    for design, value in given:
         name = local_name(design)
-        if value in types and designs.get(name) == design:
-            given = (found[name].get(types[value]), numbers.get(value))
-            known = (each for each in given if each is not None)
-            found[name][types[value]] = min(known, default=None)
-    return {name: dict(sorted(values.items())) for name, values in found.items()}
+        if designs.get(name) == design:
+            found[name][types[value]] = numbers.get(value)
+    return found
 
 
 def _members(triples: Iterable[Triple], name: str) -> set[str]:
@@ -720,9 +722,7 @@ class Ontology:
             new = {rule.name: rule for rule in group}
             replaced += [(rule, new[rule.name]) for rule in found if rule.name in new]
             found = [*(rule for rule in found if rule.name not in new), *group]
-        found = [
-            replace(rule, enabled=False) if rule.name in disabled_rules else rule for rule in found
-        ]
+        found = [_as_enabled(rule, disabled_rules) for rule in found]
         texts = [file.text for file in files]
         return replace(
             self,
@@ -866,6 +866,10 @@ class Ontology:
         """
         for _, problem, remedy in self.unsolved(functions):
             raise KnowledgeError(problem, file=", ".join(map(str, self.files)), remedy=remedy)
+
+
+def _as_enabled(rule: Rule, disabled_rules: Collection[str]) -> Rule:
+    return replace(rule, enabled=False) if rule.name in disabled_rules else rule
 
 
 def _digest(*parts: object) -> str:

@@ -201,7 +201,8 @@ def term_of(term: Node) -> str | Lit:
 def without_log() -> Iterator[None]:
     """Keep rdflib's warnings about odd terms off the terminal."""
     logger = logging.getLogger("rdflib.term")
-    before, logger.disabled = logger.disabled, True
+    before = logger.disabled
+    logger.disabled = True
     try:
         with warnings.catch_warnings(action="ignore"):
             yield
@@ -293,7 +294,8 @@ class Names:
 
 def reached(start: Iterable[_T], steps: Iterable[tuple[_T, _T]]) -> set[_T]:
     """Find what steps, from one thing to another, lead to from a start, which is among it."""
-    found, pairs = set(start), list(steps)
+    found = set(start)
+    pairs = list(steps)
     while more := {other for one, other in pairs if one in found} - found:
         found |= more
     return found

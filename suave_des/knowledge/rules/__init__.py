@@ -304,17 +304,15 @@ def write_rule(
     """Write a rule for a rules file, one atom a line where one line would be long."""
     word = name if _WORD.fullmatch(name) and name not in ("prefix", "disabled") else _quoted(name)
     start = f"{'' if enabled else 'disabled '}{word}:"
-    sides = [[write_atom(atom, named) for atom in side] for side in (body, head)]
-    line = f"{start} {' ^ '.join(sides[0])}{' ' if body else ''}-> {' ^ '.join(sides[1])}"
+
+    def side(atoms: Iterable[Atom], between: str = " ^ ") -> str:
+        return between.join(write_atom(atom, named) for atom in atoms)
+
+    line = f"{start} {side(body)}{' ' if body else ''}-> {side(head)}"
     if len(line) <= 110:
         return line + "\n"
-    return (
-        f"{start}\n    "
-        + "\n    ^ ".join(sides[0])
-        + "\n    -> "
-        + "\n    ^ ".join(sides[1])
-        + "\n"
-    )
+    between = "\n    ^ "
+    return f"{start}\n    {side(body, between)}\n    -> {side(head, between)}\n"
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:

@@ -125,9 +125,7 @@ class Vocabulary:
         """Suggest a name of the wanted kinds, as a question."""
         bare = local_name(name)
         known = [
-            each
-            for each, iris in self.by_name.items()
-            if any(self.kinds[iri] & {*wanted} for iri in iris)
+            local_name(iri) for iri, kinds in self.kinds.items() if not kinds.isdisjoint(wanted)
         ]
         if "builtin" in wanted:
             known += map(local_name, swrl.BUILTINS)

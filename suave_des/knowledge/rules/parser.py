@@ -245,8 +245,7 @@ class _Builder:
         return literal
 
     def _place(self, token: Token) -> Place:
-        assert token.line is not None and token.column is not None
-        return Place(token.line, token.column)
+        return Place(token.line or 0, token.column or 0)
 
     def _wrong(self, token: Token, problem: str, remedy: str | None = None) -> RuleError:
         self.failed_at = token.start_pos or 0
