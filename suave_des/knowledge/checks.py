@@ -20,13 +20,33 @@ from typing import NamedTuple
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
 from suave_des.knowledge import rdf
-from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import OPERATORS, Content, Model, Ontology, wrong_values
 from suave_des.knowledge.ontology_file import place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
-from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    C_STATUS,
+    FUNCTIONAL,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    NUMERIC,
+    O_STATUS,
+    OWL,
+    PERFORMANCE,
+    QA_OPERATOR,
+    RDF_TYPE,
+    RDFS,
+    STRING,
+    SUBPROPERTY,
+    TOMASYS,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.resolver import Sources, as_written, is_metamodel
 from suave_des.knowledge.rules import (
+    COMPARISONS,
     NOT_THE_SAME,
     Atom,
     AtomKind,
@@ -37,6 +57,7 @@ from suave_des.knowledge.rules import (
     Term,
     Variable,
     write_atom,
+    write_term,
 )
 from suave_des.knowledge.rules.files import (
     NOUNS,
@@ -148,16 +169,16 @@ class Material:
     def _held_without_rules(self) -> set[str]:
         """The classes and properties of what the ontologies or a state may assert."""
         model = self.base.model
-        held = {rdf.OWL + "Thing"} | rdf.terms(
-            rdf.TOMASYS,
+        held = {OWL + "Thing"} | rdf.terms(
+            TOMASYS,
             "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
         )
         held.update(name for _, name in rdf.memberships(self.content.triples))
         held.update(name for _, name, _ in self.content.triples)
         if model.attributes:
-            held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE}
+            held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE}
         if any(model.estimated.values()):
-            held.add(rdf.HAS_QA_VALUE)
+            held.add(HAS_QA_VALUE)
         return held
 
     @cached_property
@@ -208,13 +229,13 @@ class Material:
         return self.suspicious(rule, atom.place(), f"{write_atom(atom)} {problem}", remedy)
 
 
-def _schema_steps(triples: Iterable[rdf.Triple]) -> list[tuple[str, str]]:
+def _schema_steps(triples: Iterable[Triple]) -> list[tuple[str, str]]:
     """Each class or property with those to which its members or values lead."""
-    leads = rdf.terms(rdf.RDFS, "subClassOf domain range")
-    both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
+    leads = rdf.terms(RDFS, "subClassOf domain range")
+    both_ways = rdf.terms(OWL, "equivalentClass equivalentProperty inverseOf")
     return [
         *rdf.links(triples, *leads),
-        *rdf.both_ways(rdf.links(triples, *both_ways, rdf.SUBPROPERTY)),
+        *rdf.both_ways(rdf.links(triples, *both_ways, SUBPROPERTY)),
     ]
 
 
@@ -274,8 +295,8 @@ def imports(material: Material) -> Findings:
 
 # The model, and what missions have to do with it.
 
-_ABOUT_CLASSES = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
-    rdf.OWL, "equivalentClass disjointWith"
+_ABOUT_CLASSES = rdf.terms(RDFS, "subClassOf domain range") | rdf.terms(
+    OWL, "equivalentClass disjointWith"
 )
 _PROPERTIES = ("object property", "data property", "annotation property")
 
@@ -303,7 +324,7 @@ def undefined_names(material: Material) -> Findings:
         subject, predicate, _ = triple
         problem = f"{local_name(subject)}: {used.words} {local_name(used.iri)} is not defined"
         remedy = names.nearest(used, subject)
-        if remedy is None and predicate == rdf.IS_QA_TYPE and used.kinds == ("individual",):
+        if remedy is None and predicate == IS_QA_TYPE and used.kinds == ("individual",):
             remedy = "declare a QualityAttributeType of this name"
         yield material.about(
             Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name"
@@ -326,15 +347,13 @@ class _Described:
         self._in_states = model.in_states
         self._kinds = material.base.vocabulary.kinds
         self._described = {subject for subject, _, _ in material.content.triples} | self._in_states
-        self._assumed = [
-            (model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed
-        ]
+        self._assumed = [(model.attributes[name], QA_OPERATOR) for name in material.base.assumed]
         self.namespaces = {rdf.namespace(iri) for iri in self._described}
 
-    def undefined_in(self, triple: rdf.Triple) -> _Used | None:
+    def undefined_in(self, triple: Triple) -> _Used | None:
         """The name in a triple that is not defined, its property before its value; None: none."""
         subject, predicate, value = triple
-        if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
+        if predicate == RDF_TYPE or predicate in _ABOUT_CLASSES:
             return self._undefined_class(predicate, value)
         if not rdf.is_thing(predicate) or (subject, predicate) in self._assumed:
             return None
@@ -346,10 +365,10 @@ class _Described:
         return None
 
     def _undefined_class(self, predicate: str, value: str | Lit) -> _Used | None:
-        wanted = {"class", "datatype"} if predicate == rdf.RDFS + "range" else {"class"}
+        wanted = {"class", "datatype"} if predicate == RDFS + "range" else {"class"}
         if not rdf.is_thing(value) or wanted & self._kinds.get(value, frozenset()):
             return None
-        words = "class" if predicate == rdf.RDF_TYPE else local_name(predicate)
+        words = "class" if predicate == RDF_TYPE else local_name(predicate)
         return _Used(words, value, ("class",))
 
     def nearest(self, used: _Used, subject: str) -> str | None:
@@ -422,7 +441,7 @@ def attributes_that_do_not_fit(material: Material) -> Findings:
 
 def values_that_are_not_used(material: Material) -> Findings:
     """Find values that ontologies give of measurements, in whose place missions have others."""
-    valued = rdf.subjects(material.content.triples, rdf.HAS_VALUE)
+    valued = rdf.subjects(material.content.triples, HAS_VALUE)
     for name, iri in material.base.model.measurements.items():
         if iri in valued and not material.measures(name):
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
@@ -434,7 +453,7 @@ def attributes_declared_twice(material: Material) -> Findings:
     holds.
     """
     for name, iri in material.base.model.attributes.items():
-        declared = iri, rdf.RDF_TYPE, rdf.TOMASYS + "QualityAttributeType"
+        declared = iri, RDF_TYPE, TOMASYS + "QualityAttributeType"
         files = [each for each in material.base.sources if declared in each.about(iri)]
         for each in files[:-1]:
             problem = f"declares the quality attribute type {name}, and so does {relative_path(files[-1].path)}"
@@ -448,8 +467,8 @@ def unknown_to_missions(material: Material) -> Findings:
     """
     content = material.content
     subject = material.subject
-    asserted = rdf.subjects(content.triples, rdf.C_STATUS)
-    if subject.reported is not None and rdf.C_STATUS not in content.concluded:
+    asserted = rdf.subjects(content.triples, C_STATUS)
+    if subject.reported is not None and C_STATUS not in content.concluded:
         for name, iri in sorted(material.base.model.components.items()):
             if name not in subject.reported and iri not in asserted:
                 nothing = f"nothing in the simulation reports the status of component {name}"
@@ -467,7 +486,7 @@ def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
     """Return the quality attributes that missions measure and designs expect, and that cannot be
     compared.
     """
-    compared = rdf.subjects(base.content.triples, rdf.QA_OPERATOR)
+    compared = rdf.subjects(base.content.triples, QA_OPERATOR)
     known = base.model.attributes
     return sorted(
         name for name in _expected(base.model).intersection(measured) if known[name] not in compared
@@ -476,7 +495,7 @@ def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
 
 def _expected(model: Model) -> frozenset[str]:
     """The quality attributes of which designs expect a value, without the performance."""
-    return frozenset().union(*model.estimated.values()) - {local_name(rdf.PERFORMANCE)}
+    return frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
 
 
 def thresholds_without_reaction(material: Material) -> Findings:
@@ -503,12 +522,12 @@ def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of
     2023 do.
     """
-    updatable = Lit("UPDATABLE", rdf.STRING)
+    updatable = Lit("UPDATABLE", STRING)
     return [
         (rule, atom)
         for rule in base.content.enabled_rules
         for atom in rule.head
-        if atom.predicate == rdf.O_STATUS and updatable in atom.arguments
+        if atom.predicate == O_STATUS and updatable in atom.arguments
     ]
 
 
@@ -558,7 +577,7 @@ def mistakes_that_pellet_ignores(material: Material) -> Findings:
                     yield material.suspicious(rule, place, message, remedy)
 
 
-_TEXTS = {rdf.STRING, rdf.BOOLEAN}
+_TEXTS = {STRING, BOOLEAN}
 
 
 def never_comparable(material: Material) -> Findings:
@@ -573,18 +592,18 @@ def never_comparable(material: Material) -> Findings:
         for atom in rule.body:
             for place in _compared_texts(atom, datatypes):
                 term = atom.arguments[place]
-                problem = f"{swrl.write_term(term)} is no number, and never compares with one"
+                problem = f"{write_term(term)} is no number, and never compares with one"
                 remedy = "write numbers without quotes" if isinstance(term, Lit) else None
                 yield material.suspicious(rule, atom.place(place), problem, remedy)
 
 
 def _compared_texts(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> Iterator[int]:
     """The place of a text or truth value that an atom compares with a number, if it does."""
-    if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
+    if COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
         return
     kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
     for place, (kind, other) in enumerate(zip(kinds, reversed(kinds), strict=True)):
-        if kind and other and kind <= _TEXTS and other <= rdf.NUMERIC:
+        if kind and other and kind <= _TEXTS and other <= NUMERIC:
             yield place
 
 
@@ -674,12 +693,12 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
         each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
     content = material.content
-    if rdf.IS_QA_TYPE in content.concluded:
+    if IS_QA_TYPE in content.concluded:
         return
     of_groundings = _without_value_in_groundings(material)
-    stated = rdf.values(content.triples, rdf.IS_QA_TYPE)
+    stated = rdf.values(content.triples, IS_QA_TYPE)
     for rule in content.enabled_rules:
-        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == HAS_QA_VALUE}
         for atom, attribute in attributes_asked(rule):
             name = local_name(attribute)
             if atom.arguments[0] in held:
@@ -695,7 +714,7 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
     would be right.
     """
     content, model = material.content, material.base.model
-    if rdf.HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
+    if HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
         return {}
     estimated = frozenset().union(*model.estimated.values())
     found: dict[str, tuple[str, str | None]] = {}
@@ -712,7 +731,7 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
 def attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
     """The atoms of a rule that name the quality attribute of a value, with its IRI."""
     for atom in rule.body:
-        if atom.predicate == rdf.IS_QA_TYPE and len(atom.arguments) == 2:
+        if atom.predicate == IS_QA_TYPE and len(atom.arguments) == 2:
             attribute = atom.arguments[1]
             if isinstance(attribute, Named):
                 yield atom, attribute.iri
@@ -732,7 +751,7 @@ def never_fires(material: Material) -> Findings:
 
 #: Axioms by which individuals are different: declared so, or members of disjoint classes or
 # properties.
-_MAKE_DIFFERENT = re.compile(rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
+_MAKE_DIFFERENT = re.compile(OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
 
 
 def equal_individuals(material: Material) -> Findings:
@@ -767,7 +786,7 @@ def identities_of_names(material: Material) -> Findings:
 
 
 #: Axioms by which individuals that have different names can be the same.
-_MAKE_SAME = re.compile(rdf.OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
+_MAKE_SAME = re.compile(OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
 
 
 def same_individuals(material: Material) -> Findings:
@@ -783,7 +802,7 @@ def _can_be_the_same(material: Material) -> bool:
         return True
     kinds = material.base.vocabulary.kinds
     every = (*material.content.triples, *material.content.structure)
-    functional = rdf.members(every, [rdf.FUNCTIONAL])
+    functional = rdf.members(every, [FUNCTIONAL])
     if any(rdf.is_node(name) or "object property" in kinds.get(name, ()) for name in functional):
         return True
     return any(atom.kind == "same" for atom in material.content.conclusions)
@@ -837,7 +856,7 @@ def are_near(one: str, other: str) -> bool:
 
 def two_values(material: Material) -> Findings:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
-    functional = rdf.members(material.content.triples, [rdf.FUNCTIONAL])
+    functional = rdf.members(material.content.triples, [FUNCTIONAL])
     for rule in material.rules:
         asked: dict[tuple[str, Term], Term] = {}
         for atom in rule.body:
@@ -858,7 +877,7 @@ def _changed_values(
     material: Material, rule: Rule, asked: Mapping[tuple[str, Term], Term]
 ) -> Findings:
     """Find the conclusions of a rule that give another value to what its body asks for."""
-    comparing = [atom for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "="]
+    comparing = [atom for atom in rule.body if COMPARISONS.get(atom.predicate) == "="]
     equated = {term for atom in comparing for term in atom.arguments}
     for atom in rule.head:
         before = asked.get((atom.predicate, atom.arguments[0]))
@@ -876,7 +895,7 @@ def _same(one: Term, other: Term) -> bool:
     return one == other
 
 
-_FD_REALISABILITY = rdf.TOMASYS + "fd_realisability"
+_FD_REALISABILITY = TOMASYS + "fd_realisability"
 
 
 def no_effect(material: Material) -> Findings:
@@ -905,7 +924,7 @@ def misspelt_statuses(material: Material) -> Findings:
     known = reported | _other_statuses(material)
     for rule in filter(material.is_own, material.rules):
         for atom, status in _statuses_asked(rule):
-            if isinstance(status, Lit) and status.datatype == rdf.STRING:
+            if isinstance(status, Lit) and status.datatype == STRING:
                 meant = similar(status.text.upper(), by_capitals)
                 if status.text not in known and meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
@@ -915,19 +934,19 @@ def misspelt_statuses(material: Material) -> Findings:
 
 def _other_statuses(material: Material) -> set[str]:
     """The statuses of components that an ontology asserts or a rule concludes."""
-    found: list[Term | str] = [o for _, p, o in material.content.triples if p == rdf.C_STATUS]
+    found: list[Term | str] = [o for _, p, o in material.content.triples if p == C_STATUS]
     heads = material.content.conclusions
-    found += [atom.arguments[-1] for atom in heads if atom.predicate == rdf.C_STATUS]
+    found += [atom.arguments[-1] for atom in heads if atom.predicate == C_STATUS]
     return {value.text for value in found if isinstance(value, Lit)}
 
 
 def _statuses_asked(rule: Rule) -> Iterator[tuple[Atom, Term]]:
     """What the body of a rule asks as the status of a component, in a comparison, too."""
-    asking = [atom for atom in rule.body if atom.predicate == rdf.C_STATUS]
+    asking = [atom for atom in rule.body if atom.predicate == C_STATUS]
     yield from ((atom, atom.arguments[-1]) for atom in asking)
     statuses = {atom.arguments[-1] for atom in asking if isinstance(atom.arguments[-1], Variable)}
     for atom in rule.body:
-        is_equation = swrl.COMPARISONS.get(atom.predicate) in ("=", "!=")
+        is_equation = COMPARISONS.get(atom.predicate) in ("=", "!=")
         if is_equation and not statuses.isdisjoint(atom.arguments):
             yield from ((atom, term) for term in atom.arguments)
 

@@ -25,7 +25,34 @@ from suave_des.knowledge.ontology_file import (
     enumerated_texts,
     place_of,
 )
-from suave_des.knowledge.rdf import Lit, Triple, local_name
+from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    C_STATUS,
+    DECIMAL,
+    DECISION_PROPERTIES,
+    EXACT,
+    FIRST,
+    FUNCTIONAL,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    MROS,
+    O_STATUS,
+    OWL,
+    QA_OPERATOR,
+    RDF_TYPE,
+    RDFS,
+    REST,
+    STRING,
+    SUBCLASS,
+    SUBPROPERTY,
+    SWRL,
+    SWRLA,
+    TOMASYS,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.resolver import Sources, Supply, collect
 from suave_des.knowledge.rules import Atom, Rule, Variable
 from suave_des.knowledge.rules.files import (
@@ -47,26 +74,26 @@ from suave_des.knowledge.state import (
 # The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all
 # libraries in use write and read without loss.
 
-_DECLARED = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
+_DECLARED = rdf.terms(OWL, "ObjectProperty DatatypeProperty Class")
 #: What only an object property can be: it is one, whether or not it is declared as one.
 _OF_OBJECT_PROPERTIES = rdf.terms(
-    rdf.OWL,
+    OWL,
     "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty "
     "ReflexiveProperty IrreflexiveProperty",
 )
 _PROPERTIES = _OF_OBJECT_PROPERTIES | rdf.terms(
-    rdf.OWL, "ObjectProperty DatatypeProperty FunctionalProperty"
+    OWL, "ObjectProperty DatatypeProperty FunctionalProperty"
 )
-_TRANSITIVE = rdf.OWL + "TransitiveProperty"
-_CHAIN = rdf.OWL + "propertyChainAxiom"
+_TRANSITIVE = OWL + "TransitiveProperty"
+_CHAIN = OWL + "propertyChainAxiom"
 #: That of the first draft of OWL 2, which is about a property without a name.
-_CHAIN_OF_DRAFT = rdf.OWL + "propertyChain"
+_CHAIN_OF_DRAFT = OWL + "propertyChain"
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
-_ANNOTATIONS = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") | {
-    rdf.OWL + "versionInfo",
-    rdf.SWRLA + "isRuleEnabled",
+_ANNOTATIONS = rdf.terms(RDFS, "label comment seeAlso isDefinedBy") | {
+    OWL + "versionInfo",
+    SWRLA + "isRuleEnabled",
 }
 
 
@@ -145,7 +172,7 @@ class Content:
         for subject, predicate, value in self.triples:
             if value == _TRANSITIVE:
                 rules.append(_joining_rule([subject, subject], subject))
-                triples.append((subject, predicate, rdf.OWL + "ObjectProperty"))
+                triples.append((subject, predicate, OWL + "ObjectProperty"))
             else:
                 triples.append((subject, predicate, value))
         return replace(
@@ -159,22 +186,22 @@ class Content:
         """The items of a list in the structure; one that leads back into itself ends there."""
         values: dict[tuple[str | Lit, str], str | Lit] = {(s, p): o for s, p, o in self.structure}
         found: list[str] = []
-        while (node, rdf.FIRST) in values and len(found) < len(values):
-            found.append(str(values[node, rdf.FIRST]))
-            node = values.get((node, rdf.REST), "")
+        while (node, FIRST) in values and len(found) < len(values):
+            found.append(str(values[node, FIRST]))
+            node = values.get((node, REST), "")
         return found
 
     def _related_properties(self) -> list[tuple[str, str]]:
         """Each property with those to which its values lead: super-properties and inverses."""
-        alike = rdf.links(self.triples, *rdf.terms(rdf.OWL, "inverseOf equivalentProperty"))
-        return [*rdf.links(self.triples, rdf.SUBPROPERTY), *rdf.both_ways(alike)]
+        alike = rdf.links(self.triples, *rdf.terms(OWL, "inverseOf equivalentProperty"))
+        return [*rdf.links(self.triples, SUBPROPERTY), *rdf.both_ways(alike)]
 
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and
         inverses.
         """
         heads = sorted(_concluded(self.enabled_rules))
-        wanted = {*rdf.DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
+        wanted = {*DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
         return Terms(
             _named(rdf.reached(wanted, self._related_properties())),
             tuple(name for name, kind in heads if kind == "Class"),
@@ -194,11 +221,11 @@ class Content:
         }
         classes = {
             *decisions.classes,
-            *rdf.members(self.triples, (rdf.OWL + "Class", rdf.RDFS + "Class")),
+            *rdf.members(self.triples, (OWL + "Class", RDFS + "Class")),
             *(name for _, name in rdf.memberships(self.triples)),
             *(atom.predicate for atom in asked if atom.kind == "class"),
         }
-        annotations = rdf.members(self.triples, [rdf.OWL + "AnnotationProperty"])
+        annotations = rdf.members(self.triples, [OWL + "AnnotationProperty"])
         # What has no name is an atom that SWRL does not know.
         return Terms(_named(properties - annotations - {""}), _named(classes - {""}))
 
@@ -239,11 +266,11 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
             if rdf.is_node(subject) or rdf.is_node(value):
                 structure.append((subject, predicate, value))
                 continue
-            if predicate == rdf.HAS_VALUE and local_name(subject) in values:
-                value = Lit(format(values[local_name(subject)], "f"), rdf.DECIMAL)
+            if predicate == HAS_VALUE and local_name(subject) in values:
+                value = Lit(format(values[local_name(subject)], "f"), DECIMAL)
             triples[subject, predicate, value] = None
-            if predicate == rdf.RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
-                triples[subject, rdf.RDF_TYPE, rdf.OWL + "ObjectProperty"] = None
+            if predicate == RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
+                triples[subject, RDF_TYPE, OWL + "ObjectProperty"] = None
     return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules.values()))
 
 
@@ -251,13 +278,13 @@ def _meaningful(source: OntologyFile) -> Iterator[Triple]:
     """The triples of a file without those of rules, annotations, and those about the ontology
     itself, such as imports and versions.
     """
-    ontologies = rdf.members(source.triples, [rdf.OWL + "Ontology"])
+    ontologies = rdf.members(source.triples, [OWL + "Ontology"])
     of_rules = {triple for rule in rules_of(source) for triple in rule.triples}
     for triple in source.triples:
         subject, predicate, value = triple
         is_left_out = predicate in _ANNOTATIONS or subject in ontologies or triple in of_rules
         # Protégé declares the built-ins, about which Pellet logs a warning.
-        if not is_left_out and value != rdf.SWRL + "Builtin":
+        if not is_left_out and value != SWRL + "Builtin":
             yield triple
 
 
@@ -273,7 +300,7 @@ def _declarations(triples: Iterable[Triple], rules: Sequence[Rule]) -> list[Trip
     """
     declared = rdf.members(triples, _DECLARED)
     return [
-        (name, rdf.RDF_TYPE, rdf.OWL + kind)
+        (name, RDF_TYPE, OWL + kind)
         for name, kind in sorted(_concluded(rules))
         if name not in declared
     ]
@@ -302,13 +329,13 @@ OPERATORS: Mapping[str, Callable[[Decimal, Decimal], bool]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-_SOLVES_F = rdf.TOMASYS + "solvesF"
-_TYPE_F = rdf.TOMASYS + "typeF"
-_TYPE_FD = rdf.TOMASYS + "typeFD"
+_SOLVES_F = TOMASYS + "solvesF"
+_TYPE_F = TOMASYS + "typeF"
+_TYPE_FD = TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology
 # asserts of it.
 _STATE_PROPERTIES = rdf.terms(
-    rdf.TOMASYS,
+    TOMASYS,
     "typeF typeFD solvesO o_status o_always_improve hasQAvalue isQAtype hasValue fg_status "
     "o_updatable",
 )
@@ -356,36 +383,36 @@ class Model:
         reported = dict(state.components)
         for name, iri in self.components.items():
             if name in reported:
-                yield iri, rdf.C_STATUS, Lit(reported[name], rdf.STRING)
+                yield iri, C_STATUS, Lit(reported[name], STRING)
             else:
                 yield from self.own[iri]
         for name, value in state.measurements:
             if name in self.attributes:
                 iri = self.measurements[name]
-                yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "QAvalue"), *self.own[iri])
-                yield iri, rdf.IS_QA_TYPE, self.attributes[name]
-                yield iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.DECIMAL)
+                yield from ((iri, RDF_TYPE, TOMASYS + "QAvalue"), *self.own[iri])
+                yield iri, IS_QA_TYPE, self.attributes[name]
+                yield iri, HAS_VALUE, Lit(format(value, "f"), DECIMAL)
 
     def _triples_of_loop(self, state: KnowledgeState) -> Iterator[Triple]:
         """What a state asserts of its objectives and groundings."""
         for objective in state.objectives:
             iri = self.objectives[objective.function]
-            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "Objective"), *self.own[iri])
+            yield from ((iri, RDF_TYPE, TOMASYS + "Objective"), *self.own[iri])
             yield iri, _TYPE_F, self.functions[objective.function]
             if objective.status is not None:
-                yield iri, rdf.O_STATUS, Lit(objective.status, rdf.STRING)
+                yield iri, O_STATUS, Lit(objective.status, STRING)
             if objective.always_improve:
-                yield iri, rdf.TOMASYS + "o_always_improve", Lit("true", rdf.BOOLEAN)
+                yield iri, TOMASYS + "o_always_improve", Lit("true", BOOLEAN)
         required = {objective.function for objective in state.objectives}
         for function, design in state.groundings:
             iri = self.groundings[design]
-            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "FunctionGrounding"), *self.own[iri])
+            yield from ((iri, RDF_TYPE, TOMASYS + "FunctionGrounding"), *self.own[iri])
             yield iri, _TYPE_FD, self.designs[design]
             if function in required:
-                yield iri, rdf.TOMASYS + "solvesO", self.objectives[function]
+                yield iri, TOMASYS + "solvesO", self.objectives[function]
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
-                    yield iri, rdf.HAS_QA_VALUE, self.measurements[name]
+                    yield iri, HAS_QA_VALUE, self.measurements[name]
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
@@ -401,9 +428,8 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     used = {
         "Function": rdf.values(triples, _SOLVES_F),
         "FunctionDesign": rdf.subjects(triples, _SOLVES_F),
-        "Component": rdf.subjects(triples, rdf.MROS + "requiredBy")
-        | rdf.subjects(triples, rdf.C_STATUS),
-        "QualityAttributeType": rdf.values(triples, rdf.IS_QA_TYPE),
+        "Component": rdf.subjects(triples, MROS + "requiredBy") | rdf.subjects(triples, C_STATUS),
+        "QualityAttributeType": rdf.values(triples, IS_QA_TYPE),
     }
     functions, designs, components, attributes = (
         _by_name(_members(triples, kind) | iris, kind, sources) for kind, iris in used.items()
@@ -502,7 +528,7 @@ def _separated(
     for triple in triples:
         subject, predicate, value = triple
         holder = next((str(term) for term in (subject, value) if term in individuals), None)
-        if predicate == rdf.C_STATUS:
+        if predicate == C_STATUS:
             own[subject].append(triple)
         elif holder is None:
             kept.append(triple)
@@ -516,10 +542,10 @@ def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, 
     numbers = {
         subject: Decimal(value.text.strip())
         for subject, predicate, value in triples
-        if predicate == rdf.HAS_VALUE and _is_decimal(value)
+        if predicate == HAS_VALUE and _is_decimal(value)
     }
-    types = {subject: local_name(kind) for subject, kind in rdf.links(triples, rdf.IS_QA_TYPE)}
-    links = rdf.links(triples, rdf.TOMASYS + "hasQAestimation")
+    types = {subject: local_name(kind) for subject, kind in rdf.links(triples, IS_QA_TYPE)}
+    links = rdf.links(triples, TOMASYS + "hasQAestimation")
     given = [(design, value) for design, value in links if value in types]
     # by quality attribute, and of one the smallest last, which replaces the others
     given.sort(key=lambda each: (types[each[1]], -numbers.get(each[1], Decimal("inf"))))
@@ -533,8 +559,8 @@ def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, 
 
 def _members(triples: Iterable[Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
-    below = ((above, kind) for kind, above in rdf.links(triples, rdf.SUBCLASS))
-    return rdf.members(triples, rdf.reached([rdf.TOMASYS + name], below))
+    below = ((above, kind) for kind, above in rdf.links(triples, SUBCLASS))
+    return rdf.members(triples, rdf.reached([TOMASYS + name], below))
 
 
 def wrong_values(triples: Sequence[Triple]) -> Iterator[tuple[str, str, str]]:
@@ -547,15 +573,15 @@ def wrong_values(triples: Sequence[Triple]) -> Iterator[tuple[str, str, str]]:
     Yields:
         the IRI of the individual, what is wrong, and what would be right.
     """
-    functional = rdf.members(triples, [rdf.FUNCTIONAL])
+    functional = rdf.members(triples, [FUNCTIONAL])
     names = rdf.Names(triples)
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
         shown, datatype = value if isinstance(value, Lit) else (value, "")
-        if predicate == rdf.HAS_VALUE and not _is_decimal(value):
-            but = "" if datatype in (*rdf.EXACT, "") else f" but an xsd:{local_name(datatype)}"
+        if predicate == HAS_VALUE and not _is_decimal(value):
+            but = "" if datatype in (*EXACT, "") else f" but an xsd:{local_name(datatype)}"
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
-        if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
+        if predicate == QA_OPERATOR and shown not in OPERATORS:
             problem = f"qa_comparison_operator {shown!r} is unknown"
             yield subject, problem, f"one of {' '.join(OPERATORS)}"
         if predicate in functional and isinstance(value, Lit):
@@ -574,7 +600,7 @@ def _second_value(
 
 
 def _is_decimal(value: str | Lit) -> TypeGuard[Lit]:
-    return isinstance(value, Lit) and value.datatype in rdf.EXACT and rdf.is_well_formed(value)
+    return isinstance(value, Lit) and value.datatype in EXACT and rdf.is_well_formed(value)
 
 
 def _wrong_in(
@@ -677,13 +703,10 @@ class Ontology:
         contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources.files)
         merged = merge(sources.files, values)
         model, content = build_model(merged, sources.files)
-        present = rdf.subjects(content.triples, rdf.QA_OPERATOR)
+        present = rdf.subjects(content.triples, QA_OPERATOR)
         without = {name: iri for name, iri in model.attributes.items() if iri not in present}
         assumed = {name: sign for name, sign in sorted(operators.items()) if name in without}
-        more = [
-            (without[name], rdf.QA_OPERATOR, Lit(sign, rdf.STRING))
-            for name, sign in assumed.items()
-        ]
+        more = [(without[name], QA_OPERATOR, Lit(sign, STRING)) for name, sign in assumed.items()]
         content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
         texts = enumerated_texts(sources.files)
@@ -738,7 +761,7 @@ class Ontology:
         Raises:
             KnowledgeError: a value names no individual with a hasValue, or there is no such rule.
         """
-        valued = set(map(local_name, rdf.subjects(self.stated, rdf.HAS_VALUE)))
+        valued = set(map(local_name, rdf.subjects(self.stated, HAS_VALUE)))
         named = {rule.name for rule in self.rules}
         for key, names, known, problem in (
             ("values", values, valued, "the ontology has no individual {} with a hasValue"),
@@ -842,9 +865,7 @@ class Ontology:
             if name not in self.model.functions:
                 remedy = f"functions in the ontology: {', '.join(self.functions) or 'none'}"
                 if other := self._other_namespace:
-                    remedy += (
-                        f"; it uses terms of {other}, but those of TOMASys are in {rdf.TOMASYS}"
-                    )
+                    remedy += f"; it uses terms of {other}, but those of TOMASys are in {TOMASYS}"
                 yield name, f"there is no function {name}, which the mission needs", remedy
             elif not self.designs(name):
                 remedy = f"add an individual of FunctionDesign with solvesF {name}"
