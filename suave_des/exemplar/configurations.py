@@ -393,7 +393,7 @@ def _entries(values: Mapping[str, SourcedValue]) -> Entries:
 
 
 _Limit = Annotated[Real, Field(ge=-LONGEST_S, le=LONGEST_S)]
-_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(in_order)]
+_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(in_order), Field(default=(0.0, 0.0))]
 _Count = Annotated[int, Field(strict=True, ge=1)]
 
 
@@ -408,11 +408,11 @@ class _RunnerSettings(BaseModel):
     experiments: Annotated[tuple[Json[_Experiment], ...], Field(min_length=1)]
     random_interval: _Count = 5
     random_seed: Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)] = 100
-    water_visibility_sec_shift_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_x_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_y_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_z_random_interval: _Interval = (0.0, 0.0)
-    thruster_events_random_interval: _Interval = (0.0, 0.0)
+    water_visibility_sec_shift_random_interval: _Interval
+    initial_pos_x_random_interval: _Interval
+    initial_pos_y_random_interval: _Interval
+    initial_pos_z_random_interval: _Interval
+    thruster_events_random_interval: _Interval
 
 
 class Runner(NamedTuple):

@@ -135,13 +135,12 @@ def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
         for entry, content in contents.items()
     )
     found = list[Parameter]()
-    is_ours = False
     for entry, content in contents.items():
         of_entry = list(_of_entry(document, entry, content, is_runners=is_runners))
         found += of_entry
-        is_ours = is_ours or bool(of_entry) or bool(node_of(entry, content))
+
         notes += _unread(document, entry, content, {each.name for each in of_entry})
-    if not is_ours:
+    if not found and not any(map(node_of, contents, contents.values())):
         first = next(iter(document.data), "")
         remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
         raise document.error("has nothing of SUAVE in it", (first,), remedy)

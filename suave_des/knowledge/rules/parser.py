@@ -101,7 +101,8 @@ def parse_rules(
                 token = getattr(error, "token", None)
                 at = len(text)
                 if token is None or token.type != "$END":
-                    at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
+                    blank = _BLANK.match(text, error.pos_in_stream or 0)
+                    at = blank.end()  # type: ignore[union-attr]
                 errors.append(_error(text, at, state.accepts(), file))
             line_end = text.find("\n", at)
             header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
