@@ -102,14 +102,12 @@ class _Subscription:
 
     def put(self, text: str) -> None:
         """Add a message, which may have to wait, or be dropped."""
-        if not self.waiting and self._is_free():
-            self.waiting.append(text)
-            return
         length = min(_LONGEST_QUEUE, max(length for _, length in self.wishes.values()))
-        if length:
-            while len(self.waiting) >= length:
-                self.waiting.popleft()
+        may_be_sent = not self.waiting and self._is_free()
+        if length or may_be_sent:
             self.waiting.append(text)
+            while len(self.waiting) > max(1, length):
+                self.waiting.popleft()
 
     def take(self) -> Iterator[str]:
         """Yield the messages that may be sent now."""

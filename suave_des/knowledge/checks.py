@@ -304,9 +304,8 @@ _PROPERTIES = ("object property", "data property", "annotation property")
 def values(material: Material) -> Findings:
     """Find the values that no state can be compared with, or that contradict one another."""
     for subject, problem, remedy in wrong_values(material.base.stated):
-        yield material.about(
-            Level.ERROR, local_name(subject), f"{local_name(subject)}: {problem}", remedy
-        )
+        name = local_name(subject)
+        yield material.about(Level.ERROR, name, f"{name}: {problem}", remedy)
 
 
 def undefined_names(material: Material) -> Findings:
@@ -322,13 +321,13 @@ def undefined_names(material: Material) -> Findings:
         if used is None or rdf.namespace(used.iri) not in names.namespaces:
             continue
         subject, predicate, _ = triple
-        problem = f"{local_name(subject)}: {used.words} {local_name(used.iri)} is not defined"
-        remedy = names.nearest(used, subject)
-        if remedy is None and predicate == IS_QA_TYPE and used.kinds == ("individual",):
-            remedy = "declare a QualityAttributeType of this name"
-        yield material.about(
-            Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name"
-        )
+        name = local_name(subject)
+        problem = f"{name}: {used.words} {local_name(used.iri)} is not defined"
+        otherwise = "declare it, or correct the name"
+        if predicate == IS_QA_TYPE and used.kinds == ("individual",):
+            otherwise = "declare a QualityAttributeType of this name"
+        remedy = names.nearest(used, subject) or otherwise
+        yield material.about(Level.ERROR, name, problem, remedy)
 
 
 class _Used(NamedTuple):
@@ -386,13 +385,10 @@ class _Described:
 
 def functions_without_design(material: Material) -> Findings:
     """Find the functions that have no design, or that the mission needs and that are not there."""
-    needed = {*material.subject.needed}
-    for level, names in (
-        (Level.ERROR, needed),
-        (Level.WARN, material.base.model.functions.keys() - needed),
-    ):
-        for name, problem, remedy in material.base.unsolved(names):
-            yield material.about(level, name, problem, remedy)
+    needed = material.subject.needed
+    for name, problem, remedy in material.base.unsolved({*material.base.functions, *needed}):
+        level = Level.ERROR if name in needed else Level.WARN
+        yield material.about(level, name, problem, remedy)
 
 
 def designs_and_modes(material: Material) -> Findings:
@@ -631,20 +627,15 @@ def undeclared_terms(material: Material) -> Findings:
             )
             yield material.suspicious(rule, None, problem, "declare it: a swrl:Variable")
         for number, atom in enumerate(rule.atoms):
-            if (
-                atom.kind in NOUNS
-                and not atom.expression
-                and atom.predicate not in vocabulary.kinds
-                and (number >= len(rule.body) or atom.predicate in vocabulary.used)
-            ):
-                name = local_name(atom.predicate)
+            is_taken = number >= len(rule.body) or atom.predicate in vocabulary.used
+            is_undeclared = atom.predicate not in vocabulary.kinds and not atom.expression
+            if is_taken and is_undeclared and atom.kind in NOUNS:
                 noun = NOUNS[atom.kind]
-                remedy = vocabulary.guess(atom.predicate, (noun,))
+                words = f"{noun} {local_name(atom.predicate)} is not defined"
+                guess = vocabulary.guess(atom.predicate, (noun,))
+                remedy = guess or f"declare it as {noun} in the ontology"
                 yield material.suspicious(
-                    rule,
-                    atom.place(),
-                    f"{noun} {name} is not defined: it is taken as the rule uses it",
-                    remedy or f"declare it as {noun} in the ontology",
+                    rule, atom.place(), f"{words}: it is taken as the rule uses it", remedy
                 )
 
 

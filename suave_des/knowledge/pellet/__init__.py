@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from suave_des.errors import KnowledgeError, PassingError
@@ -78,7 +77,7 @@ class TimeLimit:
         self._or_more = f", or allow more with {option}" if option else ""
         self._thread: _ReasonerThread | None = None
         self._process = 0
-        self._abandoned: _Abandoned | None = None
+        self._abandoned: tuple[Future[Any], str] | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
         """Do a piece of work and return its result; what it is doing is for the message: "reasoning
@@ -101,7 +100,7 @@ class TimeLimit:
         except BaseException:
             # After Ctrl-C, too: Java crashes if the process ends as usual meanwhile.
             if not future.done():
-                self._abandoned = _Abandoned(future, doing)
+                self._abandoned = future, doing
                 if not _abandoned:
                     # comes before the end of Java, which was registered earlier
                     atexit.register(_end_all)
@@ -111,18 +110,17 @@ class TimeLimit:
 
     def _wait_for_abandoned(self) -> None:
         """Wait for earlier work, if it was abandoned; but only once."""
-        earlier = self._abandoned
-        if earlier is None:
+        if self._abandoned is None:
             return
-        if not earlier.was_waited_for:
-            earlier.was_waited_for = True
+        future, doing = self._abandoned
+        if future not in _stuck:
             with suppress(ReasonerTimeoutError):
-                self._wait(earlier.future, earlier.doing, _AGAIN * self.seconds)
-        if not earlier.future.done():
-            _stuck.add(earlier.future)
-            earlier.future.add_done_callback(_stuck.discard)
+                self._wait(future, doing, _AGAIN * self.seconds)
+        if not future.done():
+            _stuck.add(future)
+            future.add_done_callback(_stuck.discard)
             remedy = "try again in another process, or with different rules"
-            raise ReasonerTimeoutError(f"the reasoner is still {earlier.doing}", remedy=remedy)
+            raise ReasonerTimeoutError(f"the reasoner is still {doing}", remedy=remedy)
         self._abandoned = None
 
     def _wait(self, future: Future[_Result], doing: str, limit_s: float) -> None:
@@ -154,15 +152,6 @@ class TimeLimit:
         problem = f"{doing}: not done after {waited_s:g} s, most of which the machine was busy with other work"
         remedy = f"try again when it is less busy{self._or_more}"
         return ReasonerTimeoutError(problem, remedy=remedy)
-
-
-@dataclass
-class _Abandoned:
-    """Work that took too long, and whether later work has waited for it."""
-
-    future: Future[Any]
-    doing: str
-    was_waited_for: bool = False
 
 
 class _ReasonerThread(threading.Thread):
