@@ -216,15 +216,13 @@ class Material:
         return Finding(level, message, str(file), line, remedy=remedy)
 
     def suspicious(
-        self, rule: Rule, place: Place | None, message: str, remedy: str | None = None
+        self, rule: Rule, place: Place | None, message: str, remedy: str | None
     ) -> Finding:
         """Make a finding about a rule; of one in an imported ontology it is a note."""
         level = Level.WARN if self.is_own(rule) else Level.NOTE
         return about_rule(rule, message, place, remedy, level)
 
-    def wrong_atom(
-        self, rule: Rule, atom: Atom, problem: str, remedy: str | None = None
-    ) -> Finding:
+    def wrong_atom(self, rule: Rule, atom: Atom, problem: str, remedy: str | None) -> Finding:
         """Make a finding about an atom of a rule, whose text it begins with."""
         return self.suspicious(rule, atom.place(), f"{write_atom(atom)} {problem}", remedy)
 

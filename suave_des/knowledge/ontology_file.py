@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
@@ -66,7 +66,7 @@ _EXTERNAL = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBL
 RELATIVE_TO = "http://ontology.invalid/a/a/a/a/a/a/a/a/"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OntologyFile:
     """An ontology file that has been read and parsed.
 
@@ -80,13 +80,13 @@ class OntologyFile:
     """
 
     path: Path
-    content: bytes = field(repr=False)
+    content: bytes
     iris: tuple[str, ...]
     is_xml: bool
     base: str | None
     imports: tuple[tuple[str, int], ...]
-    graph: Graph = field(repr=False)
-    triples: tuple[Triple, ...] = field(repr=False)
+    graph: Graph
+    triples: tuple[Triple, ...]
 
     @cached_property
     def _statements(self) -> dict[str, list[Triple]]:

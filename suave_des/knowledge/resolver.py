@@ -51,14 +51,12 @@ class Supply:
 
     Attributes:
         importing: the file with the import.
-        line: of the import in it; 0 where it is not known.
         iri: of the imported ontology.
         file: that supplies it.
         reason: how the file was found, for users.
     """
 
     importing: Path
-    line: int
     iri: str
     file: Path
     reason: str
@@ -91,11 +89,11 @@ def collect(given: Sequence[Path]) -> Sources:
     # The user's files first, so that the order of imports does not matter.
     for find in (_own_files_for, _all_files_for):
         for file in files:  # grows meanwhile, by imports of imports
-            for iri, line in file.imports:
+            for iri, _ in file.imports:
                 if any(each.importing == file.path and each.iri == iri for each in supplies):
                     continue
                 for source, reason in islice(find(file, iri, files), 1):
-                    supplies.append(Supply(file.path, line, iri, source.path, reason))
+                    supplies.append(Supply(file.path, iri, source.path, reason))
                     _add(files, source)
     _add_mros_if_used(files, supplies)
     return Sources(tuple(files), tuple(supplies))
@@ -185,7 +183,7 @@ def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None
         if _mentions_mros(chain.from_iterable(file.triples)):
             source = read_ontology(shipped_folder("ontology") / "mros.owl")
             reason = "shipped: its terms are used without an import"
-            supplies.append(Supply(file.path, 0, MROS, source.path, reason))
+            supplies.append(Supply(file.path, MROS, source.path, reason))
             files.append(source)
             return
 
