@@ -220,10 +220,8 @@ class Reading(NamedTuple):
         """Key paths of what the runner gives to each mission: all that has a default, with or
         without a value in its file.
         """
-        if not self.has_runner:
-            return set()
-        own = [key for key in read_by(self.revision) if key.node == RUNNER]
-        return {key.path for key in own if key.default is not None}
+        given = read_by(self.revision) if self.has_runner else ()
+        return {key.path for key in given if key.node == RUNNER and key.default is not None}
 
     def why_not(self, parameter: Parameter) -> str | None:
         """Return why a parameter does not count for a mission; None if it does."""
@@ -350,10 +348,13 @@ def _with_cosine(
     if reading.has_mission:
         kind = SourcedValue("sinusoid", "as water_visibility_observer_node has it")
         return {f"{_VISIBILITY}kind": kind, **values}
-    ignored = {path: each for path, each in values.items() if path.startswith(_VISIBILITY)}
-    given = [each.parameter for each in ignored.values() if each.parameter is not None]
-    notes += [f"{each.place}: {_NO_COSINE}" for each in given]
-    return {path: each for path, each in values.items() if path not in ignored}
+    kept = dict(values)
+    for path, (_, _, parameter) in values.items():
+        if path.startswith(_VISIBILITY):
+            del kept[path]
+            if parameter is not None:
+                notes.append(f"{parameter.place}: {_NO_COSINE}")
+    return kept
 
 
 def at(loaded: LoadedScenario, path: str) -> Any:
@@ -425,10 +426,6 @@ class Runner(NamedTuple):
         """Where a value comes from."""
         given = self.parameters.get(name)
         return f"default of {RUNNER}.{name}" if given is None else f"{given.source}: {name}"
-
-    def note(self, name: str, text: str) -> str:
-        """A note about one of its parameters."""
-        return f"{self.parameters[name].place}: {text}"
 
 
 def _runner(parameters: Sequence[Parameter]) -> Runner | None:
@@ -676,19 +673,21 @@ class Draw(NamedTuple):
 def _perturbations(runner: Runner, loaded: LoadedScenario, notes: list[str]) -> Iterator[Draw]:
     """Yield the runner's draws; notes about intervals from which nothing is drawn."""
     for number, key in enumerate(DRAWN):
+        if key.name not in runner.parameters:
+            continue
+        place = runner.parameters[key.name].place
         low, high = getattr(runner.settings, key.name)
         if (low, high) == (0.0, 0.0):
-            if key.name in runner.parameters:
-                notes.append(runner.note(key.name, "nothing is drawn from [0, 0]"))
+            notes.append(f"{place}: nothing is drawn from [0, 0]")
             continue
         around = _around(key.path.removeprefix(PERTURBED), runner, loaded)
         if not around:
-            notes.append(runner.note(key.name, f"shifts nothing: {RUNNER} has no {EVENTS}"))
+            notes.append(f"{place}: shifts nothing: {RUNNER} has no {EVENTS}")
         for path, value in around.items():
             if value is None:
-                notes.append(runner.note(key.name, _NO_COSINE))
+                notes.append(f"{place}: {_NO_COSINE}")
             elif path.startswith(EVENTS) and value + high < 0.0:
-                notes.append(runner.note(key.name, f"{path} is always before the start, and so 0"))
+                notes.append(f"{place}: {path} is always before the start, and so 0")
             else:
                 source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {value:g}"
                 yield Draw(path, number, value, low, high, source)

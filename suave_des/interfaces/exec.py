@@ -16,6 +16,7 @@ import shlex
 import signal
 import subprocess
 import time
+from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -185,7 +186,7 @@ class _Program:
         self._watcher.communicate()
 
 
-_idle: dict[tuple[str, ...], list[_Program]] = {}
+_idle: defaultdict[tuple[str, ...], list[_Program]] = defaultdict(list)
 """The programs of this process that are in no mission, by their commands."""
 _in_missions: WeakSet[_Program] = WeakSet()
 """The programs of this process that are in a mission."""
@@ -193,7 +194,7 @@ _in_missions: WeakSet[_Program] = WeakSet()
 
 def _take(command: tuple[str, ...]) -> _Program:
     """Return a program for a mission: one that is idle, or a new one."""
-    idle = _idle.setdefault(command, [])
+    idle = _idle[command]
     program = idle.pop() if idle else _Program(command)
     _in_missions.add(program)
     return program
@@ -203,7 +204,7 @@ def _give_back(command: tuple[str, ...], program: _Program) -> None:
     """Keep the program of a mission that is over for the next one."""
     _in_missions.discard(program)
     if not program.has_ended:
-        _idle.setdefault(command, []).append(program)
+        _idle[command].append(program)
 
 
 @atexit.register
