@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, Field, Json
 
@@ -161,9 +161,7 @@ def _only_in_a_campaign(runner: Runner) -> str:
 # Thruster events, as text.
 
 
-_BEFORE_START: Final = re.compile(
-    r"(\(\d+,\w+,)(-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\)", re.ASCII
-)
+_BEFORE_START = re.compile(r"(\(\d+,\w+,)(-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\)", re.ASCII)
 
 
 def _time_before_start_s(event: object) -> float | None:
@@ -222,10 +220,8 @@ class Reading(NamedTuple):
         """Key paths of what the runner gives to each mission: all that has a default, with or
         without a value in its file.
         """
-        if not self.has_runner:
-            return set()
-        own = [key for key in read_by(self.revision) if key.node == RUNNER]
-        return {key.path for key in own if key.default is not None}
+        given = read_by(self.revision) if self.has_runner else ()
+        return {key.path for key in given if key.node == RUNNER and key.default is not None}
 
     def why_not(self, parameter: Parameter) -> str | None:
         """Return why a parameter does not count for a mission; None if it does."""
@@ -236,7 +232,8 @@ class Reading(NamedTuple):
         if path == "":
             return _NOT_NEEDED
         if not is_read(parameter.node, parameter.name, self.revision):
-            instead = (f"{key.node}.{key.name}" for key in self._keys() if key.path == path)
+            keys = read_by(self.revision)
+            instead = (f"{key.node}.{key.name}" for key in keys if key.path == path)
             return f"revision {self.revision} reads {next(instead, 'nothing of the kind')}"
         if path in self.passed and parameter.node != RUNNER:
             return f"{RUNNER} gives each mission its own; without one, 0"
@@ -244,14 +241,11 @@ class Reading(NamedTuple):
 
     def defaults(self) -> Iterator[Key]:
         """Yield the keys that have a default, of nodes that take part in these missions."""
-        for key in self._keys():
+        for key in read_by(self.revision):
             takes_part = self.has_mission or (self.has_runner and key.node == RUNNER)
             is_passed = key.path in self.passed and key.node != RUNNER
             if key.default is not None and takes_part and not is_passed:
                 yield key
-
-    def _keys(self) -> tuple[Key, ...]:
-        return read_by(self.revision)
 
 
 def _values(
@@ -354,10 +348,13 @@ def _with_cosine(
     if reading.has_mission:
         kind = SourcedValue("sinusoid", "as water_visibility_observer_node has it")
         return {f"{_VISIBILITY}kind": kind, **values}
-    ignored = {path: each for path, each in values.items() if path.startswith(_VISIBILITY)}
-    given = [each.parameter for each in ignored.values() if each.parameter is not None]
-    notes += [f"{each.place}: {_NO_COSINE}" for each in given]
-    return {path: each for path, each in values.items() if path not in ignored}
+    kept = dict(values)
+    for path, (_, _, parameter) in values.items():
+        if path.startswith(_VISIBILITY):
+            del kept[path]
+            if parameter is not None:
+                notes.append(f"{parameter.place}: {_NO_COSINE}")
+    return kept
 
 
 def at(loaded: LoadedScenario, path: str) -> Any:
@@ -397,7 +394,7 @@ def _entries(values: Mapping[str, SourcedValue]) -> Entries:
 
 
 _Limit = Annotated[Real, Field(ge=-LONGEST_S, le=LONGEST_S)]
-_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(in_order)]
+_Interval = Annotated[tuple[_Limit, _Limit], AfterValidator(in_order), Field(default=(0.0, 0.0))]
 _Count = Annotated[int, Field(strict=True, ge=1)]
 
 
@@ -412,11 +409,11 @@ class _RunnerSettings(BaseModel):
     experiments: Annotated[tuple[Json[_Experiment], ...], Field(min_length=1)]
     random_interval: _Count = 5
     random_seed: Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)] = 100
-    water_visibility_sec_shift_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_x_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_y_random_interval: _Interval = (0.0, 0.0)
-    initial_pos_z_random_interval: _Interval = (0.0, 0.0)
-    thruster_events_random_interval: _Interval = (0.0, 0.0)
+    water_visibility_sec_shift_random_interval: _Interval
+    initial_pos_x_random_interval: _Interval
+    initial_pos_y_random_interval: _Interval
+    initial_pos_z_random_interval: _Interval
+    thruster_events_random_interval: _Interval
 
 
 class Runner(NamedTuple):
@@ -429,10 +426,6 @@ class Runner(NamedTuple):
         """Where a value comes from."""
         given = self.parameters.get(name)
         return f"default of {RUNNER}.{name}" if given is None else f"{given.source}: {name}"
-
-    def note(self, name: str, text: str) -> str:
-        """A note about one of its parameters."""
-        return f"{self.parameters[name].place}: {text}"
 
 
 def _runner(parameters: Sequence[Parameter]) -> Runner | None:
@@ -473,9 +466,8 @@ def _experiments(runner: Runner, notes: list[str]) -> Iterator[Experiment]:
     """The experiments, each by its own launch and mission; notes about what is not simulated."""
     parameter = runner.parameters["experiments"]
     for index, each in enumerate(runner.settings.experiments):
-        place = (
-            f"{parameter.document.path}: line {parameter.line(index)}, {parameter.keys}[{index}]"
-        )
+        line = parameter.line(index)
+        place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
         arguments = dict(re.findall(r"(\w+):=(\S*)", each.experiment_launch))
         notes += _not_simulated(place, EXPERIMENT, json.loads(parameter.value[index]))
         notes += _not_simulated(place, LAUNCH, arguments)
@@ -545,7 +537,7 @@ def _battery_constraint(
         ]
         return {}
     level = next(iter(levels), None)
-    if level is None or level == 0.0:  # no level is below 0
+    if not level:  # no level is below 0
         return {}
     return {"battery.mission_ends_at_level": SourcedValue(level, "battery_constraint_value")}
 
@@ -608,8 +600,8 @@ def _campaign(
         )
         return entries
     if runner_seed is None:
-        return {**entries, **_drawn_anew(runner, drawn)}
-    return {**entries, **_conditions(runner, drawn, most, runner_seed, notes)}
+        return entries | _drawn_anew(runner, drawn)
+    return entries | _conditions(runner, drawn, most, runner_seed, notes)
 
 
 def _drawn_anew(runner: Runner, drawn: Sequence[Draw]) -> Entries:
@@ -624,7 +616,7 @@ def _drawn_anew(runner: Runner, drawn: Sequence[Draw]) -> Entries:
         }
         if each.is_event:
             value["shared"] = "thruster_events_shift"
-        entries["perturbations", each.path] = (value, each.source)
+        entries["perturbations", each.path] = value, each.source
     return entries
 
 
@@ -639,13 +631,13 @@ def _conditions(
         notes.append(f"--runner-seed: {last}, and {sharing} here, like the others")
     stream = random.Random(seed)
     # Of all, of empty intervals, too.
-    draws = [[stream.random() for _ in DRAWN] for _ in range(conditions)]
+    draws = [stream.random() for _ in range(conditions * len(DRAWN))]
     where = f"{runner.comment('experiments')}; at each of the conditions"
     entries: Entries = {("runs",): (min(runs, sharing), where)}
     for each in drawn:
-        values = [each.value(draw[each.number]) for draw in draws]
+        values = [each.value(share) for share in draws[each.number :: len(DRAWN)]]
         source = f"{each.source}, as Python draws from seed {seed}"
-        entries["sweep", "zip", each.path] = (values, source)
+        entries["sweep", "zip", each.path] = values, source
     return entries
 
 
@@ -681,19 +673,21 @@ class Draw(NamedTuple):
 def _perturbations(runner: Runner, loaded: LoadedScenario, notes: list[str]) -> Iterator[Draw]:
     """Yield the runner's draws; notes about intervals from which nothing is drawn."""
     for number, key in enumerate(DRAWN):
+        if key.name not in runner.parameters:
+            continue
+        place = runner.parameters[key.name].place
         low, high = getattr(runner.settings, key.name)
         if (low, high) == (0.0, 0.0):
-            if key.name in runner.parameters:
-                notes.append(runner.note(key.name, "nothing is drawn from [0, 0]"))
+            notes.append(f"{place}: nothing is drawn from [0, 0]")
             continue
         around = _around(key.path.removeprefix(PERTURBED), runner, loaded)
         if not around:
-            notes.append(runner.note(key.name, f"shifts nothing: {RUNNER} has no {EVENTS}"))
+            notes.append(f"{place}: shifts nothing: {RUNNER} has no {EVENTS}")
         for path, value in around.items():
             if value is None:
-                notes.append(runner.note(key.name, _NO_COSINE))
+                notes.append(f"{place}: {_NO_COSINE}")
             elif path.startswith(EVENTS) and value + high < 0.0:
-                notes.append(runner.note(key.name, f"{path} is always before the start, and so 0"))
+                notes.append(f"{place}: {path} is always before the start, and so 0")
             else:
                 source = f"{runner.comment(key.name)} [{low:g}, {high:g}] added to {value:g}"
                 yield Draw(path, number, value, low, high, source)
@@ -724,7 +718,8 @@ _COMMENT_COLUMN = 43
 def _text(documents: Sequence[Layer], entries: Entries, notes: Sequence[str]) -> str:
     """A YAML file of these entries."""
     names = ", ".join(each.path.name for each in documents)
-    lines, above = [f"# Imported by `suave-des import-config` from {names}."], tuple[str, ...]()
+    lines = [f"# Imported by `suave-des import-config` from {names}."]
+    above: tuple[str, ...] = ()
     for path, (value, comment) in entries.items():
         for depth, key in enumerate(path[:-1]):
             if above[: depth + 1] != path[: depth + 1]:

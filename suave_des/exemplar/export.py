@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
 
@@ -146,34 +146,24 @@ def _random_times(loaded: LoadedScenario, times_s: Mapping[str, float]) -> Itera
             yield f"{path}: {shown(drawn)} here, its mean in the exemplar, as {time_s:g}"
 
 
-class Shift(NamedTuple):
-    """A draw that the runner adds to the times of all thruster events.
-
-    Attributes:
-        times_s: of the events, which may be before the start.
-        interval_s: ends of the interval that is drawn from.
-    """
-
-    times_s: tuple[float, ...]
-    interval_s: tuple[float, float]
-
-
-def _shift_of(loaded: LoadedScenario, drawn: Mapping[str, object]) -> Shift | None:
-    """Find the interval, and times that it is added to, that give what a campaign draws; None if
-    the runner cannot draw that.
+def _shift_of(
+    loaded: LoadedScenario, drawn: Mapping[str, object]
+) -> tuple[list[float], list[float]] | None:
+    """Find times of thruster events, which may be before the start, and the ends of an interval
+    added to all of them, that give what a campaign draws; None if the runner cannot draw that.
     """
     events = _drawn_events(loaded, drawn)
     widths_s = {round(high - low, _DIGITS) for _, low, high in events}
     if len(widths_s) != 1:
         return None
+    lows_s = [low for _, low, _ in events]
     # An event that is at the start here may be before it there.
-    after_start_s = [low - time_s for time_s, low, _ in events if time_s > 0.0]
-    lowest_s = after_start_s[0] if after_start_s else max(low for _, low, _ in events)
-    around_s = tuple(round(low - lowest_s, _DIGITS) for _, low, _ in events)
-    cut_s = [max(0.0, time_s) for time_s in around_s]
-    if cut_s != [round(time_s, _DIGITS) for time_s, *_ in events]:
+    after_start_s = (low - time_s for time_s, low, _ in events if time_s > 0.0)
+    lowest_s = next(after_start_s, max(lows_s))
+    around_s = [round(low - lowest_s, _DIGITS) for low in lows_s]
+    if [max(0.0, each) for each in around_s] != [round(time_s, _DIGITS) for time_s, *_ in events]:
         return None
-    return Shift(around_s, (round(lowest_s, _DIGITS), round(lowest_s + widths_s.pop(), _DIGITS)))
+    return around_s, [round(lowest_s, _DIGITS), round(lowest_s + widths_s.pop(), _DIGITS)]
 
 
 def _drawn_events(
@@ -234,10 +224,10 @@ def _value(loaded: LoadedScenario, path: str, default: object) -> object:
     value = at(loaded, path)
     if value is None and path.endswith((".minimum", ".maximum")):  # of another signal than a cosine
         value = at(loaded, f"{path.rpartition('.')[0]}.value")
-    if isinstance(default, int | float) and isinstance(value, int | float):
-        return round(value) if isinstance(default, int) else float(value)
-    is_text = default is None and isinstance(value, str)
-    return value if is_text or type(value) is type(default) else None
+    kind = str if default is None else type(default)
+    if isinstance(value, int | float) and kind in (int, float):
+        return round(value) if kind is int else float(value)
+    return value if type(value) is kind else None
 
 
 def _runner_of(loaded: LoadedScenario, campaign: Json, revision: str) -> dict[str, object]:
@@ -271,9 +261,9 @@ def _intervals(loaded: LoadedScenario, drawn: Mapping[str, object]) -> dict[str,
             if isinstance(value, float) and bounds is not None:
                 found[key.name] = [round(bound - value, _DIGITS) for bound in bounds]
         elif (shift := _shift_of(loaded, drawn)) is not None:
-            found[key.name] = list(shift.interval_s)
-            if min(shift.times_s) < 0.0:
-                found[EVENTS] = _texts(loaded.scenario.thruster_events, shift.times_s)
+            times_s, found[key.name] = shift
+            if min(times_s) < 0.0:
+                found[EVENTS] = _texts(loaded.scenario.thruster_events, times_s)
     return found
 
 

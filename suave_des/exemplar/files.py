@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from suave_des.errors import InputError, did_you_mean
 from suave_des.exemplar.keys import (
@@ -19,7 +19,7 @@ from suave_des.scenario.modes import modes_of
 from suave_des.scenario.yamlfile import Layer, read_yaml
 
 PARAMETERS = "ros__parameters"
-EVENTS: Final = "thruster_events"
+EVENTS = "thruster_events"
 _BATCHES = ("run_batch", "suave_cli")
 """The exemplar's programs that run what a file of their own describes."""
 
@@ -135,13 +135,12 @@ def _parameters(document: Layer, notes: list[str]) -> list[Parameter]:
         for entry, content in contents.items()
     )
     found = list[Parameter]()
-    is_ours = False
     for entry, content in contents.items():
         of_entry = list(_of_entry(document, entry, content, is_runners=is_runners))
         found += of_entry
-        is_ours = is_ours or bool(of_entry) or bool(node_of(entry, content))
+
         notes += _unread(document, entry, content, {each.name for each in of_entry})
-    if not is_ours:
+    if not found and not any(map(node_of, contents, contents.values())):
         first = next(iter(document.data), "")
         remedy = did_you_mean(first.removeprefix("/"), NODES, "its nodes")
         raise document.error("has nothing of SUAVE in it", (first,), remedy)

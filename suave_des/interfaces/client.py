@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar
 
 from suave_des.domain import Task
 from suave_des.errors import InputError
@@ -12,8 +12,8 @@ from suave_des.managing.simple import NoManager
 if TYPE_CHECKING:
     from suave_des.scenario.loader import LoadedScenario
 
-REQUEST_TASK: Final = "/task/request"
-CANCEL_TASK: Final = "/task/cancel"
+REQUEST_TASK = "/task/request"
+CANCEL_TASK = "/task/cancel"
 
 
 class ClientManager(NoManager):

@@ -93,39 +93,21 @@ def _outcomes(
     die even so has failed.
     """
     token = uuid.uuid4().hex
-    remaining = iter(missions)
     under_way = dict[Any, Chunk]()
     suspects = list[MissionKey]()
-    ended = SimpleQueue[Any]()
     # As the result of a task, it can be made again wherever a worker died that had it, and is sent
     # to each once.
     parcel = client.submit(bytes, pack(campaign), key=f"suave_des_parcel-{token}")
     submit = partial(client.submit, run, token, parcel, pure=False)
     try:
-        while client.status == "running":
-            # one that grows with its work begins with none
-            workers = max(2, len(client.scheduler_info()["workers"]))
-            size = max(1, min(total // (_SHARES * workers), _LARGEST_CHUNK))
-            while len(under_way) < _AHEAD * workers and (chunk := tuple(islice(remaining, size))):
-                under_way[future := submit(chunk)] = chunk
-                future.add_done_callback(ended.put)
-            if not under_way:
-                break
-            with suppress(Empty):  # of one that is lost, Dask need not tell
-                future = ended.get(timeout=_LOOK_S)
-                chunk = under_way.pop(future)
-                try:
-                    yield future.result()
-                except KilledWorker:
-                    suspects.extend(chunk)
-        else:
-            raise ConnectionError
+        yield from _results(client, submit, missions, total, under_way, suspects)
         for key in suspects:
             yield _alone(submit, campaign, key)
     except SuaveDesError:
         raise
     except Exception as error:
-        if _is_lost(client, (parcel, *under_way)):
+        futures = (parcel, *under_way)
+        if client.status != "running" or any(future.cancelled() for future in futures):
             raise WorkerError(f"the connection to the scheduler {scheduler} is lost") from None
         problem = f"a task cannot be run on the cluster: {type(error).__name__}: {error}"
         raise WorkerError(problem) from error
@@ -137,8 +119,34 @@ def _outcomes(
                 client.run(forget, token, on_error="ignore")
 
 
-def _is_lost(client: Any, futures: Iterable[Any]) -> bool:
-    return client.status != "running" or any(future.cancelled() for future in futures)
+def _results(
+    client: Any,
+    submit: Callable[[Chunk], Any],
+    missions: Iterable[MissionKey],
+    total: int,
+    under_way: dict[Any, Chunk],
+    suspects: list[MissionKey],
+) -> Iterator[list[Finished]]:
+    """Yield the outcomes of chunks; those with which workers die are added to the suspects."""
+    remaining = iter(missions)
+    ended = SimpleQueue[Any]()
+    while client.status == "running":
+        # one that grows with its work begins with none
+        workers = max(2, len(client.scheduler_info()["workers"]))
+        size = max(1, min(total // (_SHARES * workers), _LARGEST_CHUNK))
+        while len(under_way) < _AHEAD * workers and (chunk := tuple(islice(remaining, size))):
+            under_way[future := submit(chunk)] = chunk
+            future.add_done_callback(ended.put)
+        if not under_way:
+            return
+        with suppress(Empty):  # of one that is lost, Dask need not tell
+            future = ended.get(timeout=_LOOK_S)
+            chunk = under_way.pop(future)
+            try:
+                yield future.result()
+            except KilledWorker:
+                suspects.extend(chunk)
+    raise ConnectionError
 
 
 def _alone(submit: Callable[[Chunk], Any], campaign: Campaign, key: MissionKey) -> list[Finished]:

@@ -16,7 +16,8 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from functools import cache, partial
@@ -24,7 +25,7 @@ from itertools import chain
 from math import inf
 from operator import attrgetter
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar
 from weakref import WeakSet, finalize
 
 from suave_des.clock import call_at, until
@@ -35,29 +36,29 @@ from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSub
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 
-PROTOCOL: Final = 1
+PROTOCOL = 1
 """Version of the messages; a program of another version is refused."""
-LINE_LIMIT_BYTES: Final = 1_000_000
-TIME_OUT_S: Final = 10.0
+LINE_LIMIT_BYTES = 1_000_000
+TIME_OUT_S = 10.0
 """So long a program may take for an answer; the setting `time_out_s` changes it."""
-_LONGEST_S: Final = 1e6
+_LONGEST_S = 1e6
 """Of thinking."""
-_END_S: Final = 1.0
-_LOOK_S: Final = 1.0
+_END_S = 1.0
+_LOOK_S = 1.0
 """Longest wait for a program: one that took twice as long was one in which this process was stopped.
 """
-_READ_BYTES: Final = 65536
-_KILLS_AT_END_OF_INPUT: Final = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
-KINDS: Final = {
+_READ_BYTES = 65536
+_KILLS_AT_END_OF_INPUT = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
+KINDS = {
     "measured": Kind.QA_STATUS,
     "component_status": Kind.COMPONENT_STATUS,
     "pose": Kind.POSE,
     "distance": Kind.DISTANCE,
 }
-_NAMES: Final = {kind: name for name, kind in KINDS.items()}
-_ANSWER: Final = ("modes", "log", "latency_s")
-_OWN_SETTINGS: Final = ("time_out_s", "real_thinking")
-_FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
+_NAMES = {kind: name for name, kind in KINDS.items()}
+_ANSWER = ("modes", "log", "latency_s")
+_OWN_SETTINGS = ("time_out_s", "real_thinking")
+_FIRST_ANSWER = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
 
 
 class ProgramError(Exception):
@@ -185,7 +186,7 @@ class _Program:
         self._watcher.communicate()
 
 
-_idle: dict[tuple[str, ...], list[_Program]] = {}
+_idle: defaultdict[tuple[str, ...], list[_Program]] = defaultdict(list)
 """The programs of this process that are in no mission, by their commands."""
 _in_missions: WeakSet[_Program] = WeakSet()
 """The programs of this process that are in a mission."""
@@ -193,7 +194,7 @@ _in_missions: WeakSet[_Program] = WeakSet()
 
 def _take(command: tuple[str, ...]) -> _Program:
     """Return a program for a mission: one that is idle, or a new one."""
-    idle = _idle.setdefault(command, [])
+    idle = _idle[command]
     program = idle.pop() if idle else _Program(command)
     _in_missions.add(program)
     return program
@@ -203,7 +204,7 @@ def _give_back(command: tuple[str, ...], program: _Program) -> None:
     """Keep the program of a mission that is over for the next one."""
     _in_missions.discard(program)
     if not program.has_ended:
-        _idle.setdefault(command, []).append(program)
+        _idle[command].append(program)
 
 
 @atexit.register
@@ -266,9 +267,7 @@ class ExecManager(ManagingSubsystem):
             settings=settings,
             learned=learned,
             attributes=list(system.measurements),
-            functions={
-                function: system.modes.available_modes(function) for function in system.modes.nodes
-            },
+            functions=self._available_modes(),
             mission_wide_functions=system.functions,
         )
         if answer.pop("protocol", PROTOCOL) != PROTOCOL:
@@ -278,6 +277,10 @@ class ExecManager(ManagingSubsystem):
         except (TypeError, ValueError, AttributeError, KeyError) as error:
             raise self._error(f"answered {shown(answer)} to mission_started: {error}") from None
         self._begin = answer
+
+    def _available_modes(self) -> dict[str, Sequence[str]]:
+        modes = self.system.modes
+        return {function: modes.available_modes(function) for function in modes.nodes}
 
     def _take_settings(self, answer: Json) -> None:
         period_s = answer.pop("period_s", None)
@@ -385,21 +388,23 @@ class ExecManager(ManagingSubsystem):
                 f"answered {shown(dict(answer))}; modes is an object, log a list of texts"
             )
         requests = self.system.modes.requests
+        latency_s = answer.get("latency_s", 0.0)
         for line in lines:
             self.system.log("says", str(line))
         for function, mode in modes.items():
-            is_accepted = isinstance(mode, str) and self.system.change_mode(function, mode)
-            if not is_accepted and mode not in self.system.modes.available_modes(function):
-                known = {
-                    each: self.system.modes.available_modes(each)
-                    for each in self.system.modes.nodes
-                }
-                near = did_you_mean(mode, known.get(function, known), "known")
-                raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
+            self._request(function, mode)
         if self.system.modes.requests > requests:
-            self.reasoning_time_s += answer.get("latency_s", 0.0)
-        if answer.get("latency_s"):
+            self.reasoning_time_s += latency_s
+        if latency_s:
             self.system.state_changed()
+
+    def _request(self, function: str, mode: object) -> None:
+        """Request a mode; a ProgramError if there is none of that name."""
+        is_accepted = isinstance(mode, str) and self.system.change_mode(function, mode)
+        if not is_accepted and mode not in self.system.modes.available_modes(function):
+            known = self._available_modes()
+            near = did_you_mean(mode, known.get(function, known))
+            raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {near}")
 
     def _error(self, problem: str) -> ProgramError:
         return ProgramError(f"the program {problem}")

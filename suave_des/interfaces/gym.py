@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,11 +29,11 @@ from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
-NOT_MEASURED: Final = -1.0
-DRAWN_SEED_LIMIT: Final = 2**31
-_SPREADS: Final = 6.0
+NOT_MEASURED = -1.0
+DRAWN_SEED_LIMIT = 2**31
+_SPREADS = 6.0
 """So many standard deviations are taken for the bounds of a normal distribution that has none."""
-REWARD: Final = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
+REWARD = {"inspected_per_m": 1.0, "searched_per_s": -0.1, "found": 0.0, "adaptation": 0.0}
 """Weights of a step's events: a metre of pipeline that was inspected, a second of search, finding
 the pipeline, and an adaptation. A metre earns what 10 s of search cost; a mission gives about -10
 to 60."""
@@ -133,9 +133,8 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self.close()
         drawn = int(self.np_random.integers(DRAWN_SEED_LIMIT)) if seed is None else seed
         self._mission = mission = Mission(self._simulator, seed=drawn)
-        self._time_s = self._searched_s = self._distance_m = 0.0
-        self._adaptations = 0
-        self._found = False
+        self._time_s = 0.0
+        self._totals = dict.fromkeys(REWARD, 0.0)
         mission.advance(1e-9)  # the first task is requested at t = 0
         self._task_changed(mission)
         return self._observation(mission), {"seed": drawn, **self._info(mission)}
@@ -219,29 +218,26 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._read_modes(mission)
 
     def _reward(self, mission: Mission) -> float:
-        weights = self._weights
+        """Return what has been earned since the last step."""
+        before = self._totals
         found_s = mission.found_s
-        searched_s = mission.now_s if found_s is None else found_s
-        reward = weights["searched_per_s"] * (searched_s - self._searched_s)
-        self._searched_s = searched_s
-        if found_s is not None:
-            distance_m = mission.distance_inspected_m
-            reward += weights["inspected_per_m"] * (distance_m - self._distance_m)
-            self._distance_m = distance_m
-            if not self._found:
-                reward += weights["found"]
-                self._found = True
-        adaptations = mission.mode_manager.adaptations
-        reward += weights["adaptation"] * (adaptations - self._adaptations)
-        self._adaptations = adaptations
+        self._totals = {
+            "searched_per_s": mission.now_s if found_s is None else found_s,
+            "inspected_per_m": 0.0 if found_s is None else mission.distance_inspected_m,
+            "found": float(found_s is not None),
+            "adaptation": mission.mode_manager.adaptations,
+        }
+        reward = 0.0
+        for name, total in self._totals.items():
+            reward += self._weights[name] * (total - before[name])
         return float(reward)
 
     def _observation(self, mission: Mission) -> Observation:
         """Return the monitors' measurements and the state of the mission."""
         values = [mission.measured(name, NOT_MEASURED) for name in self._attributes]
         values += [float(mission.components.get(name) != FAILED) for name in THRUSTER_NAMES]
-        values += self._inspects, self._distance_m, min(self._time_s, mission.now_s) / self._limit_s
-        values += self._mode_indices
+        share = min(self._time_s, mission.now_s) / self._limit_s
+        values += self._inspects, self._totals["inspected_per_m"], share, *self._mode_indices
         return np.array(values, np.float32)
 
     def _info(self, mission: Mission) -> dict[str, object]:

@@ -18,7 +18,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
-from typing import Final, Self
+from typing import Self
 
 from scipy.spatial.transform import Rotation
 from websockets.asyncio.server import ServerConnection, serve
@@ -50,12 +50,12 @@ from suave_des.records.store import MissionKey
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
 
-DIAGNOSTICS: Final = "/diagnostics"
-CLOCK: Final = "/clock"
-POSE: Final = "/mavros/local_position/pose"
-DETECTED: Final = "/pipeline/detected"
-INSPECTED: Final = "/pipeline/distance_inspected"
-TOPICS: Final = {
+DIAGNOSTICS = "/diagnostics"
+CLOCK = "/clock"
+POSE = "/mavros/local_position/pose"
+DETECTED = "/pipeline/detected"
+INSPECTED = "/pipeline/distance_inspected"
+TOPICS = {
     DIAGNOSTICS: "diagnostic_msgs/DiagnosticArray",
     CLOCK: "rosgraph_msgs/Clock",
     POSE: "geometry_msgs/PoseStamped",
@@ -63,26 +63,26 @@ TOPICS: Final = {
     INSPECTED: "std_msgs/Float32",
 }
 """What the mission publishes: topics with their types."""
-ADVANCE_SERVICE: Final = "/suave_des/advance"
+ADVANCE_SERVICE = "/suave_des/advance"
 _CLOCK_S, _POSE_S, _SECOND_S = 0.1, 0.25, 1.0
 """Mission time between messages."""
-_LATER_S: Final = 1e-6
-_SETTLE_S: Final = 0.5
-_TICK_S: Final = 0.005
-_LONGEST_S: Final = 0.05
+_LATER_S = 1e-6
+_SETTLE_S = 0.5
+_TICK_S = 0.005
+_LONGEST_S = 0.05
 """Wall time that may pass by itself at once; in more, this process was stopped or busy."""
-_FLUSH_S: Final = 1.0
+_FLUSH_S = 1.0
 _LEVELS = ("info", "warning", "error", "none")
-_MOST_CLIENTS: Final = 32
-_MOST_NAMES: Final = 100
+_MOST_CLIENTS = 32
+_MOST_NAMES = 100
 """Subscriptions, topics and services of one client, each."""
-_BACKLOG: Final = 500
+_BACKLOG = 500
 """While so many messages wait for a slow client, it gets none that are published, nor answers."""
-_LOCK_STEP_BACKLOG: Final = 100_000
+_LOCK_STEP_BACKLOG = 100_000
 """The same, of what is published: what one advance publishes is to arrive whole."""
-_LONGEST_QUEUE: Final = 1000
-_LONGEST_NAME: Final = 200
-_IN_REAL_TIME: Final = "missions in real time do not repeat: wall time decides when a client acts"
+_LONGEST_QUEUE = 1000
+_LONGEST_NAME = 200
+_IN_REAL_TIME = "missions in real time do not repeat: wall time decides when a client acts"
 _logger = logging.getLogger("suave_des.rosbridge")
 _logger.setLevel(logging.CRITICAL)  # a handshake that fails is the client's affair
 
@@ -102,14 +102,12 @@ class _Subscription:
 
     def put(self, text: str) -> None:
         """Add a message, which may have to wait, or be dropped."""
-        if not self.waiting and self._is_free():
-            self.waiting.append(text)
-            return
         length = min(_LONGEST_QUEUE, max(length for _, length in self.wishes.values()))
-        if length:
-            while len(self.waiting) >= length:
-                self.waiting.popleft()
+        may_be_sent = not self.waiting and self._is_free()
+        if length or may_be_sent:
             self.waiting.append(text)
+            while len(self.waiting) > max(1, length):
+                self.waiting.popleft()
 
     def take(self) -> Iterator[str]:
         """Yield the messages that may be sent now."""

@@ -17,7 +17,7 @@ from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit
 
 from suave_des.domain import THRUSTER_NAMES
@@ -27,17 +27,17 @@ from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
-BODY_LIMIT_BYTES: Final = 100_000
-_READ_TIMEOUT_S: Final = 10.0
-_LENGTH_DIGITS: Final = 20
-_MOST_REPORTS: Final = 20
-_LOCAL: Final = ("localhost", "127.0.0.1", "::1")
-_JSON: Final = "application/json"
+BODY_LIMIT_BYTES = 100_000
+_READ_TIMEOUT_S = 10.0
+_LENGTH_DIGITS = 20
+_MOST_REPORTS = 20
+_LOCAL = ("localhost", "127.0.0.1", "::1")
+_JSON = "application/json"
 ADVANCE, LATENCY = "advance_s", "latency_s"
-_LONGEST_S: Final = 1e6
-_FIRST_S: Final = 1e-9
+_LONGEST_S = 1e6
+_FIRST_S = 1e-9
 """The mission time at which a client first sees it: the first task is requested at t = 0."""
-REQUESTS: Final = {
+REQUESTS = {
     "GET /": "this list",
     "GET /monitor": "what the mission's state is; null: not measured yet",
     "GET /monitor_schema": "JSON schema of the answer of /monitor, with what each name means",
@@ -51,7 +51,7 @@ REQUESTS: Final = {
     "GET /metrics": "a row of runs.csv",
 }
 """What a session answers; bodies are JSON."""
-_MEANINGS: Final = {
+_MEANINGS = {
     "time_s": "mission time",
     "is_over": "whether the mission has ended",
     "task": "the current task; empty: none",
@@ -102,17 +102,17 @@ class Session:
         self._record = record
         self._thought_s = 0.0
         self._lock = threading.Lock()
-        self._paths: dict[tuple[str, str], Callable[[object], Json]] = {
-            ("GET", "/"): lambda _: dict(REQUESTS),
-            ("GET", "/monitor"): lambda _: self._monitor(),
-            ("PUT", "/execute"): self._execute,
-            ("GET", "/adaptation_options"): lambda _: self._options(),
-            ("GET", "/monitor_schema"): lambda _: self._monitor_schema(),
-            ("GET", "/execute_schema"): lambda _: self._execute_schema(),
-            ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
-            ("POST", "/advance"): self._advance,
-            ("POST", "/start"): self._start,
-            ("GET", "/metrics"): lambda _: self._metrics(),
+        self._answers: dict[str, Callable[[object], Json]] = {
+            "GET /": lambda _: dict(REQUESTS),
+            "GET /monitor": lambda _: self._monitor(),
+            "PUT /execute": self._execute,
+            "GET /adaptation_options": lambda _: self._options(),
+            "GET /monitor_schema": lambda _: self._monitor_schema(),
+            "GET /execute_schema": lambda _: self._execute_schema(),
+            "GET /adaptation_options_schema": lambda _: self._options_schema(),
+            "POST /advance": self._advance,
+            "POST /start": self._start,
+            "GET /metrics": lambda _: self._metrics(),
         }
         self._begin(run, seed)
 
@@ -148,13 +148,14 @@ class Session:
             before_s = self.mission.now_s
             self.mission.advance(self.due_s())
             self._thought_s = self.mission.now_s - before_s
-            if (serve := self._paths.get((method, path))) is None:
+            if (serve := self._answers.get(f"{method} {path}")) is None:
                 raise LookupError(path)
             return serve(content)
 
     def methods(self, path: str) -> list[str]:
         """List the methods that a path answers."""
-        return [method for method, known in self._paths if known == path]
+        end = f" {path}"
+        return [each.removesuffix(end) for each in self._answers if each.endswith(end)]
 
     def _begin(self, run: int, seed: int) -> None:
         self.mission = Mission(
@@ -347,9 +348,9 @@ class _Handler(BaseHTTPRequestHandler):
             answer = self.server.session.answer(method, path, content)
         except RefusedError as error:
             self.close_connection = True  # a body would not be read
-            status = error.args[0]
-            answer = {"error": error.args[1]}
-            self.server.senders.report(error.args[1])
+            status, problem = error.args
+            answer = {"error": problem}
+            self.server.senders.report(problem)
         except LookupError:
             known = f": it answers {' and '.join(allowed)}" if allowed else ""
             status = HTTPStatus.METHOD_NOT_ALLOWED if allowed else HTTPStatus.NOT_FOUND

@@ -12,7 +12,7 @@ from functools import cache, lru_cache
 from itertools import chain, product
 from operator import attrgetter
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import yaml
 
@@ -30,7 +30,6 @@ from suave_des.kb.decision_table import SHIPPED, DecisionTable, read_table
 from suave_des.kb.scale import Scale
 from suave_des.kb.space import Reports, component_reports
 from suave_des.knowledge.state import (
-    NO_GROUNDING,
     NONE_LEFT,
     STAYS,
     UNGROUNDED,
@@ -45,6 +44,7 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import MetacontrolRevision
 from suave_des.scenario_knowledge import REPORTED_STATUSES, measured_attributes
 
+_Value = TypeVar("_Value")
 _AT_ONCE = MetacontrolRevision(
     task_bridge_period_s=0.0,
     objectives_at_launch=(),
@@ -216,19 +216,25 @@ def _states(
     """Yield the states of missions on which the decision on a function can depend."""
     values = [_values(scale, name, loaded) for name, scale in table.attributes.items()]
     for task in _tasks(loaded):
+        if function not in task:
+            continue
         needed = list(filter(task.__contains__, table.related(function)))
-        designs = [(NO_GROUNDING, *table.designs.get(name, ())) for name in needed]
+        designs = [(None, *table.designs.get(name, ())) for name in needed]
         objectives = [ObjectiveState(name, UNGROUNDED) for name in needed]
-        reported = _reports(table, loaded) if function in task else ()
+        reported = _reports(table, loaded) if table.counts_reports else [()]
         for measured, reports, now in product(product(*values), reported, product(*designs)):
-            known = zip(table.attributes, measured, strict=True)
-            grounded = zip(needed, now, strict=True)
             yield KnowledgeState.of(
                 objectives,
-                groundings={name: each for name, each in grounded if each != NO_GROUNDING},
+                groundings=_given(needed, now),
                 components=dict(reports),
-                measurements={name: value for name, value in known if value is not None},
+                measurements=_given(table.attributes, measured),
             )
+
+
+def _given(names: Iterable[str], values: Iterable[_Value | None]) -> dict[str, _Value]:
+    """Return the values by name that are not None."""
+    pairs = zip(names, values, strict=True)
+    return {name: value for name, value in pairs if value is not None}
 
 
 def _tasks(loaded: LoadedScenario) -> list[tuple[str, ...]]:
@@ -255,18 +261,16 @@ def _reports(table: DecisionTable, loaded: LoadedScenario) -> Iterator[Reports]:
     """Yield what components can report: once a thruster has failed, recovering makes each
     report.
     """
-    if not table.counts_reports:
-        yield ()
-        return
     events = loaded.scenario.thruster_events
-    failing = {THRUSTER_NAMES[each.thruster - 1] for each in events if each.event == "failure"}
+    failing = [THRUSTER_NAMES[each.thruster - 1] for each in events if each.event == "failure"]
     groups = _groups(table.settings.interchangeable)
-    hull = [(), ((HULL, LEAK),)] if loaded.scenario.leak is not None else [()]
     every = component_reports(groups, (FAILED, RECOVERED), len(THRUSTER_NAMES) if events else 0)
-    for reports, leak in product(every, hull):
-        failed = {name for name, status in reports if status == FAILED}
-        if all(len(failed & group) <= len(failing & group) for group in map(set, groups)):
-            yield *reports, *leak
+    for reports in every:
+        failed = [name for name, status in reports if status == FAILED]
+        if all(len({*failed} & {*group}) <= len({*failing} & {*group}) for group in groups):
+            yield reports
+            if loaded.scenario.leak is not None:
+                yield *reports, (HULL, LEAK)
 
 
 def _groups(interchangeable: Iterable[Iterable[str]]) -> list[tuple[str, ...]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
 
 import py_trees
 from py_trees.behaviour import Behaviour
@@ -11,7 +10,7 @@ from py_trees.common import Status
 
 from suave_des.managing.base import ManagingSubsystem, System
 
-MAX_TICKED: Final = 100_000
+MAX_TICKED = 100_000
 """A tick that goes through more behaviours than this is assumed never to end."""
 
 

@@ -13,22 +13,43 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property
-from itertools import chain, takewhile
+from itertools import chain, filterfalse, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
 from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, UNGROUND_MODE, WATER_VISIBILITY
 from suave_des.errors import Finding, KnowledgeError, Level, nearest, relative_path, similar
 from suave_des.knowledge import rdf
-from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology import OPERATORS, Content, Model, Ontology, wrong_values
 from suave_des.knowledge.ontology_file import place_of
 from suave_des.knowledge.pellet import TIME_LIMIT_S
-from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    C_STATUS,
+    FUNCTIONAL,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    NUMERIC,
+    O_STATUS,
+    OWL,
+    PERFORMANCE,
+    QA_OPERATOR,
+    RDF_TYPE,
+    RDFS,
+    STRING,
+    SUBPROPERTY,
+    TOMASYS,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.resolver import Sources, as_written, is_metamodel
 from suave_des.knowledge.rules import (
+    COMPARISONS,
     NOT_THE_SAME,
     Atom,
+    AtomKind,
     Named,
     Place,
     Rule,
@@ -36,6 +57,7 @@ from suave_des.knowledge.rules import (
     Term,
     Variable,
     write_atom,
+    write_term,
 )
 from suave_des.knowledge.rules.files import (
     NOUNS,
@@ -47,6 +69,8 @@ from suave_des.knowledge.rules.files import (
     variable_uses,
 )
 from suave_des.resources import shipped_folder, shown_name
+
+Findings = Iterator[Finding]
 
 
 @dataclass(frozen=True)
@@ -140,21 +164,21 @@ class Material:
             waiting = [rule for rule in waiting if rule not in firing]
             held.update(atom.predicate for rule in firing for atom in rule.head)
             possible = rdf.reached(held, steps)
-        return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
+        return [(rule, next(filterfalse(allows, rule.body))) for rule in waiting]
 
     def _held_without_rules(self) -> set[str]:
         """The classes and properties of what the ontologies or a state may assert."""
         model = self.base.model
-        held = {rdf.OWL + "Thing"} | rdf.terms(
-            rdf.TOMASYS,
+        held = {OWL + "Thing"} | rdf.terms(
+            TOMASYS,
             "Objective FunctionGrounding typeF typeFD solvesO o_always_improve c_status o_status",
         )
         held.update(name for _, name in rdf.memberships(self.content.triples))
         held.update(name for _, name, _ in self.content.triples)
         if model.attributes:
-            held |= {rdf.TOMASYS + "QAvalue", rdf.IS_QA_TYPE, rdf.HAS_VALUE}
+            held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE}
         if any(model.estimated.values()):
-            held.add(rdf.HAS_QA_VALUE)
+            held.add(HAS_QA_VALUE)
         return held
 
     @cached_property
@@ -192,20 +216,24 @@ class Material:
         return Finding(level, message, str(file), line, remedy=remedy)
 
     def suspicious(
-        self, rule: Rule, place: Place | None, message: str, remedy: str | None = None
+        self, rule: Rule, place: Place | None, message: str, remedy: str | None
     ) -> Finding:
         """Make a finding about a rule; of one in an imported ontology it is a note."""
         level = Level.WARN if self.is_own(rule) else Level.NOTE
         return about_rule(rule, message, place, remedy, level)
 
+    def wrong_atom(self, rule: Rule, atom: Atom, problem: str, remedy: str | None) -> Finding:
+        """Make a finding about an atom of a rule, whose text it begins with."""
+        return self.suspicious(rule, atom.place(), f"{write_atom(atom)} {problem}", remedy)
 
-def _schema_steps(triples: Iterable[rdf.Triple]) -> list[tuple[str, str]]:
+
+def _schema_steps(triples: Iterable[Triple]) -> list[tuple[str, str]]:
     """Each class or property with those to which its members or values lead."""
-    leads = rdf.terms(rdf.RDFS, "subClassOf domain range")
-    both_ways = rdf.terms(rdf.OWL, "equivalentClass equivalentProperty inverseOf")
+    leads = rdf.terms(RDFS, "subClassOf domain range")
+    both_ways = rdf.terms(OWL, "equivalentClass equivalentProperty inverseOf")
     return [
         *rdf.links(triples, *leads),
-        *rdf.both_ways(rdf.links(triples, *both_ways, rdf.SUBPROPERTY)),
+        *rdf.both_ways(rdf.links(triples, *both_ways, SUBPROPERTY)),
     ]
 
 
@@ -251,7 +279,7 @@ def findings_in(base: Ontology, subject: Subject) -> list[Finding]:
 # The files.
 
 
-def imports(material: Material) -> Iterator[Finding]:
+def imports(material: Material) -> Findings:
     """Note which files supply what the user's files import, in one line for each of these."""
     shipped = shipped_folder("ontology")
     by_file: dict[Path, list[str]] = defaultdict(list)
@@ -265,21 +293,20 @@ def imports(material: Material) -> Iterator[Finding]:
 
 # The model, and what missions have to do with it.
 
-_ABOUT_CLASSES = rdf.terms(rdf.RDFS, "subClassOf domain range") | rdf.terms(
-    rdf.OWL, "equivalentClass disjointWith"
+_ABOUT_CLASSES = rdf.terms(RDFS, "subClassOf domain range") | rdf.terms(
+    OWL, "equivalentClass disjointWith"
 )
 _PROPERTIES = ("object property", "data property", "annotation property")
 
 
-def values(material: Material) -> Iterator[Finding]:
+def values(material: Material) -> Findings:
     """Find the values that no state can be compared with, or that contradict one another."""
     for subject, problem, remedy in wrong_values(material.base.stated):
-        yield material.about(
-            Level.ERROR, local_name(subject), f"{local_name(subject)}: {problem}", remedy
-        )
+        name = local_name(subject)
+        yield material.about(Level.ERROR, name, f"{name}: {problem}", remedy)
 
 
-def undefined_names(material: Material) -> Iterator[Finding]:
+def undefined_names(material: Material) -> Findings:
     """Find the classes, properties and individuals that are used and defined nowhere: most are
     misspelt.
 
@@ -292,13 +319,13 @@ def undefined_names(material: Material) -> Iterator[Finding]:
         if used is None or rdf.namespace(used.iri) not in names.namespaces:
             continue
         subject, predicate, _ = triple
-        problem = f"{local_name(subject)}: {used.words} {local_name(used.iri)} is not defined"
-        remedy = names.nearest(used, subject)
-        if remedy is None and predicate == rdf.IS_QA_TYPE and used.kinds == ("individual",):
-            remedy = "declare a QualityAttributeType of this name"
-        yield material.about(
-            Level.ERROR, local_name(subject), problem, remedy or "declare it, or correct the name"
-        )
+        name = local_name(subject)
+        problem = f"{name}: {used.words} {local_name(used.iri)} is not defined"
+        otherwise = "declare it, or correct the name"
+        if predicate == IS_QA_TYPE and used.kinds == ("individual",):
+            otherwise = "declare a QualityAttributeType of this name"
+        remedy = names.nearest(used, subject) or otherwise
+        yield material.about(Level.ERROR, name, problem, remedy)
 
 
 class _Used(NamedTuple):
@@ -317,32 +344,29 @@ class _Described:
         self._in_states = model.in_states
         self._kinds = material.base.vocabulary.kinds
         self._described = {subject for subject, _, _ in material.content.triples} | self._in_states
-        self._assumed = {
-            (model.attributes[name], rdf.QA_OPERATOR) for name in material.base.assumed
-        }
+        self._assumed = [(model.attributes[name], QA_OPERATOR) for name in material.base.assumed]
         self.namespaces = {rdf.namespace(iri) for iri in self._described}
 
-    def undefined_in(self, triple: rdf.Triple) -> _Used | None:
+    def undefined_in(self, triple: Triple) -> _Used | None:
         """The name in a triple that is not defined, its property before its value; None: none."""
         subject, predicate, value = triple
-        if predicate == rdf.RDF_TYPE or predicate in _ABOUT_CLASSES:
+        if predicate == RDF_TYPE or predicate in _ABOUT_CLASSES:
             return self._undefined_class(predicate, value)
-        if predicate.startswith(rdf.LANGUAGE_NAMESPACES) or (subject, predicate) in self._assumed:
+        if not rdf.is_thing(predicate) or (subject, predicate) in self._assumed:
             return None
         if predicate not in self._described:
             return _Used("property", predicate, _PROPERTIES)
-        if value in self._described or "object property" not in self._kinds.get(predicate, ()):
-            return None
-        if _is_of_language(value):
-            return None
-        return _Used(local_name(predicate), str(value), ("individual",))
+        leads_to_things = "object property" in self._kinds.get(predicate, ())
+        if leads_to_things and rdf.is_thing(value) and value not in self._described:
+            return _Used(local_name(predicate), value, ("individual",))
+        return None
 
     def _undefined_class(self, predicate: str, value: str | Lit) -> _Used | None:
-        wanted = {"class", "datatype"} if predicate == rdf.RDFS + "range" else {"class"}
-        if _is_of_language(value) or wanted & self._kinds.get(str(value), frozenset()):
+        wanted = {"class", "datatype"} if predicate == RDFS + "range" else {"class"}
+        if not rdf.is_thing(value) or wanted & self._kinds.get(value, frozenset()):
             return None
-        words = "class" if predicate == rdf.RDF_TYPE else local_name(predicate)
-        return _Used(words, str(value), ("class",))
+        words = "class" if predicate == RDF_TYPE else local_name(predicate)
+        return _Used(words, value, ("class",))
 
     def nearest(self, used: _Used, subject: str) -> str | None:
         """Ask whether another name was meant: of the same last part, else the most similar one."""
@@ -357,32 +381,25 @@ class _Described:
         return nearest(local_name(used.iri), map(local_name, known))
 
 
-def _is_of_language(value: str | Lit) -> bool:
-    """Whether a value is a literal, or a term of OWL, RDF, SWRL or the like."""
-    return isinstance(value, Lit) or value.startswith(rdf.LANGUAGE_NAMESPACES)
-
-
-def functions_without_design(material: Material) -> Iterator[Finding]:
+def functions_without_design(material: Material) -> Findings:
     """Find the functions that have no design, or that the mission needs and that are not there."""
-    needed = {*material.subject.needed}
-    for level, names in (
-        (Level.ERROR, needed),
-        (Level.WARN, material.base.model.functions.keys() - needed),
-    ):
-        for name, problem, remedy in material.base.unsolved(names):
-            yield material.about(level, name, problem, remedy)
+    needed = material.subject.needed
+    for name, problem, remedy in material.base.unsolved({*material.base.functions, *needed}):
+        level = Level.ERROR if name in needed else Level.WARN
+        yield material.about(level, name, problem, remedy)
 
 
-def designs_and_modes(material: Material) -> Iterator[Finding]:
+def designs_and_modes(material: Material) -> Findings:
     """Find the function designs that no mode has the name of, and the modes that metacontrol never
     chooses.
     """
+    known = material.subject.modes
+    if known is None:
+        return
     otherwise = "add a mode of this name to the System Modes file, or remove the design"
-    for function in sorted(
-        material.base.model.functions if material.subject.modes is not None else ()
-    ):
+    for function in sorted(material.base.functions):
         designs = {*material.base.designs(function)}
-        modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
+        modes = {*known.get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
         for design in sorted(designs - modes):
             problem = f"function design {design} has no mode of the same name for {function}"
             yield material.about(
@@ -393,7 +410,7 @@ def designs_and_modes(material: Material) -> Iterator[Finding]:
             yield material.about(Level.NOTE, function, problem)
 
 
-def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
+def attributes_that_do_not_fit(material: Material) -> Findings:
     """Find quality attributes that missions measure and ontologies lack, or compare with
     nothing.
     """
@@ -416,21 +433,21 @@ def attributes_that_do_not_fit(material: Material) -> Iterator[Finding]:
             yield material.about(Level.WARN, name, problem, remedy)
 
 
-def values_that_are_not_used(material: Material) -> Iterator[Finding]:
+def values_that_are_not_used(material: Material) -> Findings:
     """Find values that ontologies give of measurements, in whose place missions have others."""
-    valued = rdf.subjects(material.content.triples, rdf.HAS_VALUE)
+    valued = rdf.subjects(material.content.triples, HAS_VALUE)
     for name, iri in material.base.model.measurements.items():
         if iri in valued and not material.measures(name):
             problem = f"hasValue of {local_name(iri)} is not used: {name} has the value that missions measure"
             yield material.about(Level.WARN, local_name(iri), problem, "measure it in the scenario")
 
 
-def attributes_declared_twice(material: Material) -> Iterator[Finding]:
+def attributes_declared_twice(material: Material) -> Findings:
     """Find the quality attribute types that several files declare: what each of them says of one
     holds.
     """
     for name, iri in material.base.model.attributes.items():
-        declared = iri, rdf.RDF_TYPE, rdf.TOMASYS + "QualityAttributeType"
+        declared = iri, RDF_TYPE, TOMASYS + "QualityAttributeType"
         files = [each for each in material.base.sources if declared in each.about(iri)]
         for each in files[:-1]:
             problem = f"declares the quality attribute type {name}, and so does {relative_path(files[-1].path)}"
@@ -438,14 +455,14 @@ def attributes_declared_twice(material: Material) -> Iterator[Finding]:
             yield Finding(Level.WARN, problem, *place, remedy="declare it in one of them")
 
 
-def unknown_to_missions(material: Material) -> Iterator[Finding]:
+def unknown_to_missions(material: Material) -> Findings:
     """Note the components whose status nothing reports, and the attributes that designs expect and
     nothing measures.
     """
     content = material.content
     subject = material.subject
-    asserted = rdf.subjects(content.triples, rdf.C_STATUS)
-    if subject.reported is not None and rdf.C_STATUS not in content.concluded:
+    asserted = rdf.subjects(content.triples, C_STATUS)
+    if subject.reported is not None and C_STATUS not in content.concluded:
         for name, iri in sorted(material.base.model.components.items()):
             if name not in subject.reported and iri not in asserted:
                 nothing = f"nothing in the simulation reports the status of component {name}"
@@ -463,7 +480,7 @@ def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
     """Return the quality attributes that missions measure and designs expect, and that cannot be
     compared.
     """
-    compared = rdf.subjects(base.content.triples, rdf.QA_OPERATOR)
+    compared = rdf.subjects(base.content.triples, QA_OPERATOR)
     known = base.model.attributes
     return sorted(
         name for name in _expected(base.model).intersection(measured) if known[name] not in compared
@@ -472,21 +489,23 @@ def without_operator(base: Ontology, measured: Collection[str]) -> list[str]:
 
 def _expected(model: Model) -> frozenset[str]:
     """The quality attributes of which designs expect a value, without the performance."""
-    return frozenset().union(*model.estimated.values()) - {local_name(rdf.PERFORMANCE)}
+    return frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
 
 
-def thresholds_without_reaction(material: Material) -> Iterator[Finding]:
+def thresholds_without_reaction(material: Material) -> Findings:
     """Find the search designs whose expected visibility the metric of reactions does not know."""
     known = material.subject.reaction_thresholds_m
-    for design in material.base.designs(GENERATE_SEARCH_PATH) if known is not None else ():
+    if known is None:
+        return
+    for design in material.base.designs(GENERATE_SEARCH_PATH):
         expected_m = material.base.expected(design).get(WATER_VISIBILITY)
-        if expected_m is not None and float(expected_m) not in (known or ()):
+        if expected_m is not None and float(expected_m) not in known:
             problem = f"{design} expects {expected_m} m of visibility, which is not a threshold of mean_reaction_time_s"
             remedy = "set reaction_metric.visibility_thresholds_m and expected_altitudes_m"
             yield material.about(Level.WARN, design, problem, remedy)
 
 
-def assumed_operators(material: Material) -> Iterator[Finding]:
+def assumed_operators(material: Material) -> Findings:
     """Note which comparison operators are assumed."""
     return (
         material.about(Level.NOTE, name, words) for name, words in material.base.assumptions.items()
@@ -497,12 +516,12 @@ def rules_of_2023(base: Ontology) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of
     2023 do.
     """
-    heads = [(rule, atom) for rule in base.content.enabled_rules for atom in rule.head]
-    updatable = Lit("UPDATABLE", rdf.XSD + "string")
+    updatable = Lit("UPDATABLE", STRING)
     return [
         (rule, atom)
-        for rule, atom in heads
-        if atom.predicate == rdf.O_STATUS and updatable in atom.arguments
+        for rule in base.content.enabled_rules
+        for atom in rule.head
+        if atom.predicate == O_STATUS and updatable in atom.arguments
     ]
 
 
@@ -530,7 +549,7 @@ def check_revision(base: Ontology, measured: Collection[str], revision: str) -> 
         )
 
 
-def another_revision(material: Material) -> Iterator[Finding]:
+def another_revision(material: Material) -> Findings:
     """Find ontologies of revision 2023 in a scenario of another one."""
     try:
         check_revision(material.base, material.subject.measured or (), material.subject.revision)
@@ -541,7 +560,7 @@ def another_revision(material: Material) -> Iterator[Finding]:
 # Rules that Pellet would ignore, or that never fire.
 
 
-def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
+def mistakes_that_pellet_ignores(material: Material) -> Findings:
     """Find what Pellet would drop or ignore without a word."""
     for rule in material.rules:
         if rule not in material.for_other_models:
@@ -552,10 +571,10 @@ def mistakes_that_pellet_ignores(material: Material) -> Iterator[Finding]:
                     yield material.suspicious(rule, place, message, remedy)
 
 
-_TEXTS = rdf.terms(rdf.XSD, "string boolean")
+_TEXTS = {STRING, BOOLEAN}
 
 
-def never_comparable(material: Material) -> Iterator[Finding]:
+def never_comparable(material: Material) -> Findings:
     """Find comparisons of a number with a text or a truth value, which hold for no values."""
     ranges = material.base.vocabulary.ranges
     for rule in material.rules:
@@ -565,24 +584,21 @@ def never_comparable(material: Material) -> Iterator[Finding]:
             if atom.kind == "data" and len(atom.arguments) == 2
         }
         for atom in rule.body:
-            place = _compared_text(atom, datatypes)
-            if place is not None:
+            for place in _compared_texts(atom, datatypes):
                 term = atom.arguments[place]
-                problem = f"{swrl.write_term(term)} is no number, and never compares with one"
+                problem = f"{write_term(term)} is no number, and never compares with one"
                 remedy = "write numbers without quotes" if isinstance(term, Lit) else None
                 yield material.suspicious(rule, atom.place(place), problem, remedy)
 
 
-def _compared_text(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> int | None:
-    """The place of a text or truth value that an atom compares with a number; None: there is
-    none.
-    """
-    if swrl.COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
-        return None
+def _compared_texts(atom: Atom, datatypes: Mapping[Term, frozenset[str]]) -> Iterator[int]:
+    """The place of a text or truth value that an atom compares with a number, if it does."""
+    if COMPARISONS.get(atom.predicate, "!=") == "!=" or len(atom.arguments) != 2:
+        return
     kinds = [_datatypes_of(term, datatypes) for term in atom.arguments]
-    numbers = [bool(kind) and kind <= rdf.NUMERIC for kind in kinds]
-    texts = [bool(kind) and kind <= _TEXTS for kind in kinds]
-    return texts.index(True) if True in texts and True in numbers else None
+    for place, (kind, other) in enumerate(zip(kinds, reversed(kinds), strict=True)):
+        if kind and other and kind <= _TEXTS and other <= NUMERIC:
+            yield place
 
 
 def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset[str]:
@@ -590,20 +606,16 @@ def _datatypes_of(term: Term, known: Mapping[Term, frozenset[str]]) -> frozenset
     return frozenset({term.datatype}) if isinstance(term, Lit) else known.get(term, frozenset())
 
 
-def literals_of_expressions(material: Material) -> Iterator[Finding]:
+def literals_of_expressions(material: Material) -> Findings:
     """Find literals in class expressions and data ranges that are none of their datatype."""
     for source in material.base.sources:
         for subject, _, value in source.triples:
-            if (
-                subject.startswith("_:")
-                and isinstance(value, Lit)
-                and not rdf.is_well_formed(value)
-            ):
+            if rdf.is_node(subject) and isinstance(value, Lit) and not rdf.is_well_formed(value):
                 problem = f"a class expression has {value.text!r}, which is not an xsd:{local_name(value.datatype)}"
                 yield Finding(Level.ERROR, problem, str(source.path))
 
 
-def undeclared_terms(material: Material) -> Iterator[Finding]:
+def undeclared_terms(material: Material) -> Findings:
     """Find what rules use and no ontology declares, which a reasoner takes all the same."""
     vocabulary = material.base.vocabulary
     for rule in material.rules:
@@ -613,24 +625,19 @@ def undeclared_terms(material: Material) -> Iterator[Finding]:
             )
             yield material.suspicious(rule, None, problem, "declare it: a swrl:Variable")
         for number, atom in enumerate(rule.atoms):
-            if (
-                atom.kind in NOUNS
-                and not atom.expression
-                and atom.predicate not in vocabulary.kinds
-                and (number >= len(rule.body) or atom.predicate in vocabulary.used)
-            ):
-                name = local_name(atom.predicate)
+            is_taken = number >= len(rule.body) or atom.predicate in vocabulary.used
+            is_undeclared = atom.predicate not in vocabulary.kinds and not atom.expression
+            if is_taken and is_undeclared and atom.kind in NOUNS:
                 noun = NOUNS[atom.kind]
-                remedy = vocabulary.guess(atom.predicate, (noun,))
+                words = f"{noun} {local_name(atom.predicate)} is not defined"
+                guess = vocabulary.guess(atom.predicate, (noun,))
+                remedy = guess or f"declare it as {noun} in the ontology"
                 yield material.suspicious(
-                    rule,
-                    atom.place(),
-                    f"{noun} {name} is not defined: it is taken as the rule uses it",
-                    remedy or f"declare it as {noun} in the ontology",
+                    rule, atom.place(), f"{words}: it is taken as the rule uses it", remedy
                 )
 
 
-def shared_names(material: Material) -> Iterator[Finding]:
+def shared_names(material: Material) -> Findings:
     """Find rules of one name, other than those of TOMASys and mros, and those that replace another
     one.
     """
@@ -643,9 +650,8 @@ def shared_names(material: Material) -> Iterator[Finding]:
     }
     for rule in rules:
         if names[rule.name] > 1 and rule.name in own:
-            yield material.suspicious(
-                rule, None, f"{names[rule.name]} rules have this name", "rename one"
-            )
+            problem = f"{names[rule.name]} rules have this name"
+            yield material.suspicious(rule, None, problem, "rename one")
     for old, new in material.content.replaced:
         if (old.text, old.enabled) != (new.text, new.enabled):
             problem = f"replaces the rule of this name in {relative_path(old.file)}"
@@ -654,7 +660,7 @@ def shared_names(material: Material) -> Iterator[Finding]:
             )
 
 
-def for_other_models(material: Material) -> Iterator[Finding]:
+def for_other_models(material: Material) -> Findings:
     """Note the rules of TOMASys and mros that need what this model does not have, a file in one
     line.
     """
@@ -676,12 +682,12 @@ def unmeasured_rules(material: Material) -> Iterator[tuple[Rule, Atom, str, str 
         each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
     content = material.content
-    if rdf.IS_QA_TYPE in content.concluded:
+    if IS_QA_TYPE in content.concluded:
         return
     of_groundings = _without_value_in_groundings(material)
-    stated = rdf.values(content.triples, rdf.IS_QA_TYPE)
+    stated = rdf.values(content.triples, IS_QA_TYPE)
     for rule in content.enabled_rules:
-        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == rdf.HAS_QA_VALUE}
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == HAS_QA_VALUE}
         for atom, attribute in attributes_asked(rule):
             name = local_name(attribute)
             if atom.arguments[0] in held:
@@ -697,32 +703,30 @@ def _without_value_in_groundings(material: Material) -> dict[str, tuple[str, str
     would be right.
     """
     content, model = material.content, material.base.model
-    if rdf.HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
+    if HAS_QA_VALUE in content.concluded | {name for _, name, _ in content.triples}:
         return {}
     estimated = frozenset().union(*model.estimated.values())
     found: dict[str, tuple[str, str | None]] = {}
     for name in model.attributes:
+        so = f"{name}, so no grounding has a value of it"
         if name not in estimated:
-            problem = (
-                f"no function design has an estimate of {name}, so no grounding has a value of it"
-            )
-            found[name] = problem, f"add a hasQAestimation of type {name} to a design"
+            remedy = f"add a hasQAestimation of type {name} to a design"
+            found[name] = (f"no function design has an estimate of {so}", remedy)
         elif not material.measures(name):
-            problem = f"missions do not measure {name}, so no grounding has a value of it"
-            found[name] = problem, None
+            found[name] = (f"missions do not measure {so}", None)
     return found
 
 
 def attributes_asked(rule: Rule) -> Iterator[tuple[Atom, str]]:
     """The atoms of a rule that name the quality attribute of a value, with its IRI."""
     for atom in rule.body:
-        if atom.predicate == rdf.IS_QA_TYPE and len(atom.arguments) == 2:
+        if atom.predicate == IS_QA_TYPE and len(atom.arguments) == 2:
             attribute = atom.arguments[1]
             if isinstance(attribute, Named):
                 yield atom, attribute.iri
 
 
-def never_fires(material: Material) -> Iterator[Finding]:
+def never_fires(material: Material) -> Findings:
     """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
     told = list(material.for_other_models)
     dead = [
@@ -736,50 +740,49 @@ def never_fires(material: Material) -> Iterator[Finding]:
 
 #: Axioms by which individuals are different: declared so, or members of disjoint classes or
 # properties.
-_MAKE_DIFFERENT = re.compile(rdf.OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
+_MAKE_DIFFERENT = re.compile(OWL + "(different|AllD|disjoint|propertyDisjoint|complement)")
 
 
-def equal_individuals(material: Material) -> Iterator[Finding]:
+def equal_individuals(material: Material) -> Findings:
     """Find rules that ask for different individuals (differentFrom), where nothing makes any
     different.
 
     Values of functional properties can, so such a rule is suspicious, not dead.
     """
     heads = {atom.kind for atom in material.content.conclusions}
-    if any(map(_MAKE_DIFFERENT.match, material.terms)) or "different" in heads:
-        return
-    remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+    if not any(map(_MAKE_DIFFERENT.match, material.terms)) and "different" not in heads:
+        needs = "needs individuals that are declared different; different names are not enough"
+        remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+        yield from _asking_for(material, "different", needs, remedy)
+
+
+def _asking_for(
+    material: Material, kind: AtomKind, problem: str, remedy: str | None = None
+) -> Findings:
+    """Find atoms of a kind in the bodies of rules."""
     for rule in material.rules:
         for atom in rule.body:
-            if atom.kind == "different":
-                needs = (
-                    "needs individuals that are declared different; different names are not enough"
-                )
-                yield material.suspicious(rule, atom.place(), f"{write_atom(atom)} {needs}", remedy)
+            if atom.kind == kind:
+                yield material.wrong_atom(rule, atom, problem, remedy)
 
 
-def identities_of_names(material: Material) -> Iterator[Finding]:
+def identities_of_names(material: Material) -> Findings:
     """Find rules that ask about identity with nothing but names, as knowledge.rules says."""
     remedy = "add an atom about these individuals, such as their class"
     for rule in material.rules:
         for atom in rule.identities_of_names:
-            problem = f"{write_atom(atom)} {NOT_THE_SAME}"
-            yield material.suspicious(rule, atom.place(), problem, remedy)
+            yield material.wrong_atom(rule, atom, NOT_THE_SAME, remedy)
 
 
 #: Axioms by which individuals that have different names can be the same.
-_MAKE_SAME = re.compile(rdf.OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
+_MAKE_SAME = re.compile(OWL + "(sameAs|InverseFunctional|.*ardinality|oneOf|hasKey|hasValue)")
 
 
-def same_individuals(material: Material) -> Iterator[Finding]:
+def same_individuals(material: Material) -> Findings:
     """Find rules that ask for the same individuals (sameAs), where nothing makes any the same."""
-    if _can_be_the_same(material):
-        return
-    for rule in material.rules:
-        for atom in rule.body:
-            if atom.kind == "same":
-                problem = f"{write_atom(atom)} holds of an individual and itself only: nothing says that two names mean one"
-                yield material.suspicious(rule, atom.place(), problem)
+    if not _can_be_the_same(material):
+        problem = "holds of an individual and itself only: nothing says that two names mean one"
+        yield from _asking_for(material, "same", problem)
 
 
 def _can_be_the_same(material: Material) -> bool:
@@ -788,7 +791,7 @@ def _can_be_the_same(material: Material) -> bool:
         return True
     kinds = material.base.vocabulary.kinds
     every = (*material.content.triples, *material.content.structure)
-    functional = rdf.members(every, [rdf.FUNCTIONAL])
+    functional = rdf.members(every, [FUNCTIONAL])
     if any(rdf.is_node(name) or "object property" in kinds.get(name, ()) for name in functional):
         return True
     return any(atom.kind == "same" for atom in material.content.conclusions)
@@ -797,7 +800,7 @@ def _can_be_the_same(material: Material) -> bool:
 # Rules that cannot mean what their author wanted.
 
 
-def misspelt_variables(material: Material) -> Iterator[Finding]:
+def misspelt_variables(material: Material) -> Findings:
     """Find variables that occur once, and whose name is nearly that of another."""
     for rule in material.rules:
         places: dict[str, list[Place | None]] = defaultdict(list)
@@ -840,9 +843,9 @@ def are_near(one: str, other: str) -> bool:
     return has_same_ends and is_word and similar(one, [other], cutoff=0.8) is not None
 
 
-def two_values(material: Material) -> Iterator[Finding]:
+def two_values(material: Material) -> Findings:
     """Find what a rule asks, or concludes, to have two values of a property that has one."""
-    functional = rdf.members(material.content.triples, [rdf.FUNCTIONAL])
+    functional = rdf.members(material.content.triples, [FUNCTIONAL])
     for rule in material.rules:
         asked: dict[tuple[str, Term], Term] = {}
         for atom in rule.body:
@@ -861,20 +864,17 @@ def two_values(material: Material) -> Iterator[Finding]:
 
 def _changed_values(
     material: Material, rule: Rule, asked: Mapping[tuple[str, Term], Term]
-) -> Iterator[Finding]:
+) -> Findings:
     """Find the conclusions of a rule that give another value to what its body asks for."""
-    comparing = [atom for atom in rule.body if swrl.COMPARISONS.get(atom.predicate) == "="]
+    comparing = [atom for atom in rule.body if COMPARISONS.get(atom.predicate) == "="]
     equated = {term for atom in comparing for term in atom.arguments}
     for atom in rule.head:
         before = asked.get((atom.predicate, atom.arguments[0]))
         if atom.kind != "data" or before is None or before in equated:
             continue
         if not _same(before, atom.arguments[-1]):
-            name = local_name(atom.predicate)
-            problem = f"{write_atom(atom)} contradicts {name} in the body, which holds as well"
-            yield material.suspicious(
-                rule, atom.place(), problem, "rules add facts, and change none"
-            )
+            problem = f"contradicts {local_name(atom.predicate)} in the body, which holds as well"
+            yield material.wrong_atom(rule, atom, problem, "rules add facts, and change none")
 
 
 def _same(one: Term, other: Term) -> bool:
@@ -884,23 +884,25 @@ def _same(one: Term, other: Term) -> bool:
     return one == other
 
 
-_FD_REALISABILITY = rdf.TOMASYS + "fd_realisability"
+_FD_REALISABILITY = TOMASYS + "fd_realisability"
 
 
-def no_effect(material: Material) -> Iterator[Finding]:
+def no_effect(material: Material) -> Findings:
     """Find rules that conclude that a design is realisable, which no decision asks."""
     if any(atom.predicate == _FD_REALISABILITY for rule in material.rules for atom in rule.body):
         return
+    problem = (
+        "fd_realisability true has no effect: a design counts as realisable unless it is false"
+    )
+    remedy = "write the opposite condition, and conclude false"
     for rule in material.rules:
         for atom in rule.head:
             term = atom.arguments[-1] if atom.predicate == _FD_REALISABILITY else None
             if isinstance(term, Lit) and term.text in ("true", "1"):
-                problem = "fd_realisability true has no effect: a design counts as realisable unless it is false"
-                remedy = "write the opposite condition, and conclude false"
                 yield material.suspicious(rule, atom.place(), problem, remedy)
 
 
-def misspelt_statuses(material: Material) -> Iterator[Finding]:
+def misspelt_statuses(material: Material) -> Findings:
     """Find the user's rules that ask for a component's status that is nearly one that the
     simulation reports.
 
@@ -911,7 +913,7 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
     known = reported | _other_statuses(material)
     for rule in filter(material.is_own, material.rules):
         for atom, status in _statuses_asked(rule):
-            if isinstance(status, Lit) and status.datatype == rdf.XSD + "string":
+            if isinstance(status, Lit) and status.datatype == STRING:
                 meant = similar(status.text.upper(), by_capitals)
                 if status.text not in known and meant is not None:
                     problem = f'nothing in the simulation reports c_status "{status.text}"'
@@ -921,19 +923,19 @@ def misspelt_statuses(material: Material) -> Iterator[Finding]:
 
 def _other_statuses(material: Material) -> set[str]:
     """The statuses of components that an ontology asserts or a rule concludes."""
-    found: list[Term | str] = [o for _, p, o in material.content.triples if p == rdf.C_STATUS]
-    for rule in material.rules:
-        found += [atom.arguments[-1] for atom in rule.head if atom.predicate == rdf.C_STATUS]
+    found: list[Term | str] = [o for _, p, o in material.content.triples if p == C_STATUS]
+    heads = material.content.conclusions
+    found += [atom.arguments[-1] for atom in heads if atom.predicate == C_STATUS]
     return {value.text for value in found if isinstance(value, Lit)}
 
 
 def _statuses_asked(rule: Rule) -> Iterator[tuple[Atom, Term]]:
     """What the body of a rule asks as the status of a component, in a comparison, too."""
-    asking = [atom for atom in rule.body if atom.predicate == rdf.C_STATUS]
+    asking = [atom for atom in rule.body if atom.predicate == C_STATUS]
     yield from ((atom, atom.arguments[-1]) for atom in asking)
     statuses = {atom.arguments[-1] for atom in asking if isinstance(atom.arguments[-1], Variable)}
     for atom in rule.body:
-        is_equation = swrl.COMPARISONS.get(atom.predicate) in ("=", "!=")
+        is_equation = COMPARISONS.get(atom.predicate) in ("=", "!=")
         if is_equation and not statuses.isdisjoint(atom.arguments):
             yield from ((atom, term) for term in atom.arguments)
 

@@ -25,7 +25,34 @@ from suave_des.knowledge.ontology_file import (
     enumerated_texts,
     place_of,
 )
-from suave_des.knowledge.rdf import Lit, local_name
+from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    C_STATUS,
+    DECIMAL,
+    DECISION_PROPERTIES,
+    EXACT,
+    FIRST,
+    FUNCTIONAL,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    MROS,
+    O_STATUS,
+    OWL,
+    QA_OPERATOR,
+    RDF_TYPE,
+    RDFS,
+    REST,
+    STRING,
+    SUBCLASS,
+    SUBPROPERTY,
+    SWRL,
+    SWRLA,
+    TOMASYS,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.resolver import Sources, Supply, collect
 from suave_des.knowledge.rules import Atom, Rule, Variable
 from suave_des.knowledge.rules.files import (
@@ -47,28 +74,26 @@ from suave_des.knowledge.state import (
 # The content of files, in the form that reasoners are given: N-Triples, which, unlike RDF/XML, all
 # libraries in use write and read without loss.
 
-_DECLARED = rdf.terms(rdf.OWL, "ObjectProperty DatatypeProperty Class")
-_CLASSES = frozenset((rdf.OWL + "Class", rdf.RDFS + "Class"))
-_PROPERTIES = rdf.terms(
-    rdf.OWL,
-    "ObjectProperty DatatypeProperty FunctionalProperty InverseFunctionalProperty TransitiveProperty "
-    "SymmetricProperty AsymmetricProperty ReflexiveProperty IrreflexiveProperty",
-)
+_DECLARED = rdf.terms(OWL, "ObjectProperty DatatypeProperty Class")
 #: What only an object property can be: it is one, whether or not it is declared as one.
 _OF_OBJECT_PROPERTIES = rdf.terms(
-    rdf.OWL,
-    "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty ReflexiveProperty "
-    "IrreflexiveProperty",
+    OWL,
+    "InverseFunctionalProperty TransitiveProperty SymmetricProperty AsymmetricProperty "
+    "ReflexiveProperty IrreflexiveProperty",
 )
-_TRANSITIVE = rdf.OWL + "TransitiveProperty"
-_CHAIN = rdf.OWL + "propertyChainAxiom"
+_PROPERTIES = _OF_OBJECT_PROPERTIES | rdf.terms(
+    OWL, "ObjectProperty DatatypeProperty FunctionalProperty"
+)
+_TRANSITIVE = OWL + "TransitiveProperty"
+_CHAIN = OWL + "propertyChainAxiom"
 #: That of the first draft of OWL 2, which is about a property without a name.
-_CHAIN_OF_DRAFT = rdf.OWL + "propertyChain"
+_CHAIN_OF_DRAFT = OWL + "propertyChain"
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
-_ANNOTATIONS = rdf.terms(rdf.RDFS, "label comment seeAlso isDefinedBy") | {
-    *(rdf.OWL + "versionInfo", rdf.SWRLA + "isRuleEnabled")
+_ANNOTATIONS = rdf.terms(RDFS, "label comment seeAlso isDefinedBy") | {
+    OWL + "versionInfo",
+    SWRLA + "isRuleEnabled",
 }
 
 
@@ -94,8 +119,8 @@ class Content:
             with its replacement.
     """
 
-    triples: tuple[rdf.Triple, ...]
-    structure: tuple[rdf.Triple, ...]
+    triples: tuple[Triple, ...]
+    structure: tuple[Triple, ...]
     rules: tuple[Rule, ...]
     replaced: tuple[tuple[Rule, Rule], ...] = ()
 
@@ -135,7 +160,7 @@ class Content:
         that holds of named individuals, and at once.
         """
         rules: list[Rule] = []
-        kept: list[rdf.Triple] = []
+        kept: list[Triple] = []
         for triple in self.structure:
             subject, predicate, value = triple
             links = self._items(value) if predicate == _CHAIN else []
@@ -143,11 +168,11 @@ class Content:
                 rules.append(_joining_rule(links, subject))
             else:
                 kept.append(triple)
-        triples: list[rdf.Triple] = []
+        triples: list[Triple] = []
         for subject, predicate, value in self.triples:
             if value == _TRANSITIVE:
                 rules.append(_joining_rule([subject, subject], subject))
-                triples.append((subject, predicate, rdf.OWL + "ObjectProperty"))
+                triples.append((subject, predicate, OWL + "ObjectProperty"))
             else:
                 triples.append((subject, predicate, value))
         return replace(
@@ -161,22 +186,22 @@ class Content:
         """The items of a list in the structure; one that leads back into itself ends there."""
         values: dict[tuple[str | Lit, str], str | Lit] = {(s, p): o for s, p, o in self.structure}
         found: list[str] = []
-        while (node, rdf.FIRST) in values and len(found) < len(values):
-            found.append(str(values[node, rdf.FIRST]))
-            node = values.get((node, rdf.REST), "")
+        while (node, FIRST) in values and len(found) < len(values):
+            found.append(str(values[node, FIRST]))
+            node = values.get((node, REST), "")
         return found
 
     def _related_properties(self) -> list[tuple[str, str]]:
         """Each property with those to which its values lead: super-properties and inverses."""
-        alike = rdf.links(self.triples, *rdf.terms(rdf.OWL, "inverseOf equivalentProperty"))
-        return [*rdf.links(self.triples, rdf.SUBPROPERTY), *rdf.both_ways(alike)]
+        alike = rdf.links(self.triples, *rdf.terms(OWL, "inverseOf equivalentProperty"))
+        return [*rdf.links(self.triples, SUBPROPERTY), *rdf.both_ways(alike)]
 
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and
         inverses.
         """
         heads = sorted(_concluded(self.enabled_rules))
-        wanted = {*rdf.DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
+        wanted = {*DECISION_PROPERTIES, *(name for name, kind in heads if kind != "Class")}
         return Terms(
             _named(rdf.reached(wanted, self._related_properties())),
             tuple(name for name, kind in heads if kind == "Class"),
@@ -196,11 +221,11 @@ class Content:
         }
         classes = {
             *decisions.classes,
-            *rdf.members(self.triples, _CLASSES),
+            *rdf.members(self.triples, (OWL + "Class", RDFS + "Class")),
             *(name for _, name in rdf.memberships(self.triples)),
             *(atom.predicate for atom in asked if atom.kind == "class"),
         }
-        annotations = rdf.members(self.triples, [rdf.OWL + "AnnotationProperty"])
+        annotations = rdf.members(self.triples, [OWL + "AnnotationProperty"])
         # What has no name is an atom that SWRL does not know.
         return Terms(_named(properties - annotations - {""}), _named(classes - {""}))
 
@@ -224,15 +249,15 @@ def _joining_rule(links: Sequence[str], whole: str) -> Rule:
 
 
 def _named(iris: Iterable[str]) -> tuple[str, ...]:
-    return tuple(sorted(iri for iri in iris if not iri.startswith(rdf.LANGUAGE_NAMESPACES)))
+    return tuple(sorted(filter(rdf.is_thing, iris)))
 
 
 def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Content:
     """Merge the triples and rules of files, with the values of named QAvalue individuals
     replaced.
     """
-    triples = dict[rdf.Triple, None]()
-    structure: list[rdf.Triple] = []
+    triples = dict[Triple, None]()
+    structure: list[Triple] = []
     rules: dict[tuple[str, str], Rule] = {}  # of two that say the same in several files, the first
     for source in sorted(sources, key=lambda source: source.content):
         for rule in rules_of(source):
@@ -241,26 +266,25 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
             if rdf.is_node(subject) or rdf.is_node(value):
                 structure.append((subject, predicate, value))
                 continue
-            if predicate == rdf.HAS_VALUE and local_name(subject) in values:
-                value = Lit(format(values[local_name(subject)], "f"), rdf.XSD + "decimal")
+            if predicate == HAS_VALUE and local_name(subject) in values:
+                value = Lit(format(values[local_name(subject)], "f"), DECIMAL)
             triples[subject, predicate, value] = None
-            if predicate == rdf.RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
-                triples[subject, rdf.RDF_TYPE, rdf.OWL + "ObjectProperty"] = None
+            if predicate == RDF_TYPE and value in _OF_OBJECT_PROPERTIES:
+                triples[subject, RDF_TYPE, OWL + "ObjectProperty"] = None
     return Content(tuple(sorted(triples, key=str)), tuple(structure), _in_order(rules.values()))
 
 
-def _meaningful(source: OntologyFile) -> Iterator[rdf.Triple]:
+def _meaningful(source: OntologyFile) -> Iterator[Triple]:
     """The triples of a file without those of rules, annotations, and those about the ontology
     itself, such as imports and versions.
     """
-    kind = (rdf.RDF_TYPE, rdf.OWL + "Ontology")
-    ontologies = {s for s, p, o in source.triples if (p, o) == kind}
+    ontologies = rdf.members(source.triples, [OWL + "Ontology"])
     of_rules = {triple for rule in rules_of(source) for triple in rule.triples}
     for triple in source.triples:
         subject, predicate, value = triple
         is_left_out = predicate in _ANNOTATIONS or subject in ontologies or triple in of_rules
         # Protégé declares the built-ins, about which Pellet logs a warning.
-        if not is_left_out and value != rdf.SWRL + "Builtin":
+        if not is_left_out and value != SWRL + "Builtin":
             yield triple
 
 
@@ -268,7 +292,7 @@ def _in_order(rules: Iterable[Rule]) -> tuple[Rule, ...]:
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text, str(rule.file))))
 
 
-def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[rdf.Triple]:
+def _declarations(triples: Iterable[Triple], rules: Sequence[Rule]) -> list[Triple]:
     """Declare properties and classes that occur only in the head of a rule.
 
     Pellet accepts an undeclared term, but stock owlready2 drops what is inferred of it; declared,
@@ -276,7 +300,7 @@ def _declarations(triples: Iterable[rdf.Triple], rules: Sequence[Rule]) -> list[
     """
     declared = rdf.members(triples, _DECLARED)
     return [
-        (name, rdf.RDF_TYPE, rdf.OWL + kind)
+        (name, RDF_TYPE, OWL + kind)
         for name, kind in sorted(_concluded(rules))
         if name not in declared
     ]
@@ -289,7 +313,7 @@ def _concluded(rules: Iterable[Rule]) -> set[tuple[str, str]]:
     return {(atom.predicate, kinds[atom.kind]) for atom in heads if atom.kind in kinds}
 
 
-def _rule_triples(rule: Rule, number: int) -> Iterator[rdf.Triple]:
+def _rule_triples(rule: Rule, number: int) -> Iterator[Triple]:
     """A rule's triples, with an IRI for the rule and numbered blank nodes."""
     triples = [triple for triple in triples_of(rule) if triple[1] not in _ANNOTATIONS]
     own: dict[str | Lit, str] = {triples[0][0]: f"{RULE_IRI}{number}"}
@@ -305,27 +329,20 @@ OPERATORS: Mapping[str, Callable[[Decimal, Decimal], bool]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-_HAS_QA_ESTIMATION = rdf.TOMASYS + "hasQAestimation"
-_ALWAYS = rdf.TOMASYS + "o_always_improve"
-_SOLVES_F = rdf.TOMASYS + "solvesF"
-_SOLVES_O = rdf.TOMASYS + "solvesO"
-_TYPE_F = rdf.TOMASYS + "typeF"
-_TYPE_FD = rdf.TOMASYS + "typeFD"
+_SOLVES_F = TOMASYS + "solvesF"
+_TYPE_F = TOMASYS + "typeF"
+_TYPE_FD = TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology
 # asserts of it.
-_STATE_PROPERTIES = frozenset(
-    {
-        _TYPE_F,
-        _TYPE_FD,
-        _SOLVES_O,
-        rdf.O_STATUS,
-        _ALWAYS,
-        rdf.HAS_QA_VALUE,
-        rdf.IS_QA_TYPE,
-        rdf.HAS_VALUE,
-    }
-    | {rdf.TOMASYS + "fg_status", rdf.TOMASYS + "o_updatable"}
+_STATE_PROPERTIES = rdf.terms(
+    TOMASYS,
+    "typeF typeFD solvesO o_status o_always_improve hasQAvalue isQAtype hasValue fg_status "
+    "o_updatable",
 )
+
+
+Iris = Mapping[str, str]
+"""IRIs by name."""
 
 
 @dataclass(frozen=True)
@@ -343,14 +360,14 @@ class Model:
             value, sorted, each with the smallest one; None where that is no number.
     """
 
-    functions: Mapping[str, str]
-    designs: Mapping[str, str]
-    components: Mapping[str, str]
-    attributes: Mapping[str, str]
-    objectives: Mapping[str, str]
-    groundings: Mapping[str, str]
-    measurements: Mapping[str, str]
-    own: Mapping[str, tuple[rdf.Triple, ...]]
+    functions: Iris
+    designs: Iris
+    components: Iris
+    attributes: Iris
+    objectives: Iris
+    groundings: Iris
+    measurements: Iris
+    own: Mapping[str, tuple[Triple, ...]]
     estimated: Mapping[str, Mapping[str, Decimal | None]]
 
     @cached_property
@@ -360,42 +377,42 @@ class Model:
             (*self.objectives.values(), *self.groundings.values(), *self.measurements.values())
         )
 
-    def triples(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
+    def triples(self, state: KnowledgeState) -> Iterator[Triple]:
         """What a state asserts of its objectives, groundings, components and measurements."""
         yield from self._triples_of_loop(state)
         reported = dict(state.components)
         for name, iri in self.components.items():
             if name in reported:
-                yield iri, rdf.C_STATUS, Lit(reported[name], rdf.XSD + "string")
+                yield iri, C_STATUS, Lit(reported[name], STRING)
             else:
                 yield from self.own[iri]
         for name, value in state.measurements:
             if name in self.attributes:
                 iri = self.measurements[name]
-                yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "QAvalue"), *self.own[iri])
-                yield iri, rdf.IS_QA_TYPE, self.attributes[name]
-                yield iri, rdf.HAS_VALUE, Lit(format(value, "f"), rdf.XSD + "decimal")
+                yield from ((iri, RDF_TYPE, TOMASYS + "QAvalue"), *self.own[iri])
+                yield iri, IS_QA_TYPE, self.attributes[name]
+                yield iri, HAS_VALUE, Lit(format(value, "f"), DECIMAL)
 
-    def _triples_of_loop(self, state: KnowledgeState) -> Iterator[rdf.Triple]:
+    def _triples_of_loop(self, state: KnowledgeState) -> Iterator[Triple]:
         """What a state asserts of its objectives and groundings."""
         for objective in state.objectives:
             iri = self.objectives[objective.function]
-            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "Objective"), *self.own[iri])
+            yield from ((iri, RDF_TYPE, TOMASYS + "Objective"), *self.own[iri])
             yield iri, _TYPE_F, self.functions[objective.function]
             if objective.status is not None:
-                yield iri, rdf.O_STATUS, Lit(objective.status, rdf.XSD + "string")
+                yield iri, O_STATUS, Lit(objective.status, STRING)
             if objective.always_improve:
-                yield iri, _ALWAYS, Lit("true", rdf.XSD + "boolean")
+                yield iri, TOMASYS + "o_always_improve", Lit("true", BOOLEAN)
         required = {objective.function for objective in state.objectives}
         for function, design in state.groundings:
             iri = self.groundings[design]
-            yield from ((iri, rdf.RDF_TYPE, rdf.TOMASYS + "FunctionGrounding"), *self.own[iri])
+            yield from ((iri, RDF_TYPE, TOMASYS + "FunctionGrounding"), *self.own[iri])
             yield iri, _TYPE_FD, self.designs[design]
             if function in required:
-                yield iri, _SOLVES_O, self.objectives[function]
+                yield iri, TOMASYS + "solvesO", self.objectives[function]
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
-                    yield iri, rdf.HAS_QA_VALUE, self.measurements[name]
+                    yield iri, HAS_QA_VALUE, self.measurements[name]
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
@@ -411,16 +428,15 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     used = {
         "Function": rdf.values(triples, _SOLVES_F),
         "FunctionDesign": rdf.subjects(triples, _SOLVES_F),
-        "Component": rdf.subjects(triples, rdf.MROS + "requiredBy")
-        | rdf.subjects(triples, rdf.C_STATUS),
-        "QualityAttributeType": rdf.values(triples, rdf.IS_QA_TYPE),
+        "Component": rdf.subjects(triples, MROS + "requiredBy") | rdf.subjects(triples, C_STATUS),
+        "QualityAttributeType": rdf.values(triples, IS_QA_TYPE),
     }
-    by_name = {
-        kind: _by_name(_members(triples, kind) | iris, kind, sources) for kind, iris in used.items()
-    }
-    objectives = _in_states(content, by_name["Function"], _OBJECTIVES)
-    groundings = _in_states(content, by_name["FunctionDesign"], _GROUNDINGS)
-    measurements = _in_states(content, by_name["QualityAttributeType"], _MEASUREMENTS)
+    functions, designs, components, attributes = (
+        _by_name(_members(triples, kind) | iris, kind, sources) for kind, iris in used.items()
+    )
+    objectives = _in_states(triples, functions, "Objective", objective_name, _TYPE_F)
+    groundings = _in_states(triples, designs, "FunctionGrounding", grounding_name, _TYPE_FD)
+    measurements = _in_states(triples, attributes, "QAvalue", measurement_name)
     in_states = [*objectives.values(), *groundings.values(), *measurements.values()]
     if len(set(in_states)) < len(in_states):
         raise KnowledgeError(
@@ -428,18 +444,17 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
             file=sources[0].path,
             remedy="rename one, for example f_search and search",
         )
-    components = by_name["Component"]
     own, kept = _separated(triples, in_states, components.values())
     model = Model(
-        functions=by_name["Function"],
-        designs=by_name["FunctionDesign"],
+        functions=functions,
+        designs=designs,
         components=components,
-        attributes=by_name["QualityAttributeType"],
+        attributes=attributes,
         objectives=objectives,
         groundings=groundings,
         measurements=measurements,
         own=own,
-        estimated=_estimated(triples, by_name["FunctionDesign"]),
+        estimated=_estimated(triples, designs),
     )
     return model, replace(content, triples=kept)
 
@@ -463,44 +478,36 @@ def _by_name(iris: Iterable[str], kind: str, sources: Sequence[OntologyFile]) ->
     return dict(sorted(found.items()))
 
 
-class _OfStates(NamedTuple):
-    """A kind of individuals that only states assert.
-
-    Attributes:
-        class_name: their class in TOMASys.
-        property: that leads to the function or the function design that one is for; None where
-            other individuals have that property, too.
-        rename: makes the name of one from that of what it is for.
-    """
-
-    class_name: str
-    property: str | None
-    rename: Callable[[str], str]
-
-
-_OBJECTIVES = _OfStates("Objective", _TYPE_F, objective_name)
-_GROUNDINGS = _OfStates("FunctionGrounding", _TYPE_FD, grounding_name)
-_MEASUREMENTS = _OfStates("QAvalue", None, measurement_name)
-
-
-def _in_states(content: Content, things: Mapping[str, str], kind: _OfStates) -> dict[str, str]:
+def _in_states(
+    triples: Sequence[Triple],
+    things: Iris,
+    class_name: str,
+    rename: Callable[[str], str],
+    leading: str = "",
+) -> dict[str, str]:
     """Return the individual that states have for each of some things, by the thing's name.
 
     It is the one that an ontology describes: by its property, else by its usual name, unless that
     is the name of something else. Otherwise it is a new one.
+
+    Args:
+        class_name: the individuals' class in TOMASys.
+        rename: makes the usual name of one from that of what it is for.
+        leading: the property that leads from one to what it is for; none where other individuals
+            have that property, too.
     """
-    triples = content.triples
-    named = {local_name(iri): iri for iri in sorted(_described(triples), reverse=True)}
-    others = _described(triples) - _members(triples, kind.class_name) - _without_class(triples)
-    linked: dict[str, list[str]] = {}
-    for subject, value in rdf.links(triples, kind.property):
-        linked.setdefault(value, []).append(subject)
+    described = {subject for subject, _, _ in triples}
+    named = {local_name(iri): iri for iri in sorted(described, reverse=True)}
+    # what has no class but those of OWL, such as owl:NamedIndividual, may be one
+    others = {individual for individual, _ in rdf.memberships(triples)}
+    others -= _members(triples, class_name)
+    linked = list(rdf.links(triples, leading))
     found: dict[str, str] = {}
     for name, iri in things.items():
-        usual = kind.rename(name)
-        described = sorted(linked.get(iri, ()), key=lambda each: (local_name(each) != usual, each))
-        if described:
-            found[name] = described[0]
+        usual = rename(name)
+        leads = [one for one, value in linked if value == iri]
+        if leads:
+            found[name] = min(leads, key=lambda each: (local_name(each) != usual, each))
         elif usual in named and named[usual] not in others:
             found[name] = named[usual]
         else:
@@ -511,26 +518,17 @@ def _in_states(content: Content, things: Mapping[str, str], kind: _OfStates) -> 
     return found
 
 
-def _described(triples: Iterable[rdf.Triple]) -> set[str]:
-    return {subject for subject, _, _ in triples}
-
-
-def _without_class(triples: Sequence[rdf.Triple]) -> set[str]:
-    """Return what has no class but those of OWL, such as owl:NamedIndividual."""
-    return _described(triples) - {individual for individual, _ in rdf.memberships(triples)}
-
-
 def _separated(
-    triples: Iterable[rdf.Triple], in_states: Iterable[str], components: Iterable[str]
-) -> tuple[dict[str, tuple[rdf.Triple, ...]], tuple[rdf.Triple, ...]]:
+    triples: Iterable[Triple], in_states: Iterable[str], components: Iterable[str]
+) -> tuple[dict[str, tuple[Triple, ...]], tuple[Triple, ...]]:
     """Separate what holds only in states: return it by individual or component, and the rest."""
     individuals = set(in_states)
-    own: dict[str, list[rdf.Triple]] = {iri: [] for iri in (*in_states, *components)}
-    kept: list[rdf.Triple] = []
+    own: dict[str, list[Triple]] = {iri: [] for iri in (*in_states, *components)}
+    kept: list[Triple] = []
     for triple in triples:
         subject, predicate, value = triple
         holder = next((str(term) for term in (subject, value) if term in individuals), None)
-        if predicate == rdf.C_STATUS:
+        if predicate == C_STATUS:
             own[subject].append(triple)
         elif holder is None:
             kept.append(triple)
@@ -539,33 +537,33 @@ def _separated(
     return {iri: tuple(found) for iri, found in own.items()}, tuple(kept)
 
 
-def _estimated(
-    triples: Sequence[rdf.Triple], designs: Mapping[str, str]
-) -> dict[str, dict[str, Decimal | None]]:
+def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, Decimal | None]]:
     """Return the smallest expected value of each quality attribute, by the design's name."""
-    numbers = {iri: Decimal(value.text.strip()) for iri, value in _decimals(triples)}
-    types = {subject: local_name(kind) for subject, kind in rdf.links(triples, rdf.IS_QA_TYPE)}
+    numbers = {
+        subject: Decimal(value.text.strip())
+        for subject, predicate, value in triples
+        if predicate == HAS_VALUE and _is_decimal(value)
+    }
+    types = {subject: local_name(kind) for subject, kind in rdf.links(triples, IS_QA_TYPE)}
+    links = rdf.links(triples, TOMASYS + "hasQAestimation")
+    given = [(design, value) for design, value in links if value in types]
+    # by quality attribute, and of one the smallest last, which replaces the others
+    given.sort(key=lambda each: (types[each[1]], -numbers.get(each[1], Decimal("inf"))))
     found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, value in rdf.links(triples, _HAS_QA_ESTIMATION):
+    for design, value in given:
         name = local_name(design)
-        if value in types and designs.get(name) == design:
-            given = (found[name].get(types[value]), numbers.get(value))
-            known = (each for each in given if each is not None)
-            found[name][types[value]] = min(known, default=None)
-    return {name: dict(sorted(values.items())) for name, values in found.items()}
+        if designs.get(name) == design:
+            found[name][types[value]] = numbers.get(value)
+    return found
 
 
-def _decimals(triples: Iterable[rdf.Triple]) -> Iterator[tuple[str, Lit]]:
-    return ((s, o) for s, p, o in triples if p == rdf.HAS_VALUE and _is_decimal(o))
-
-
-def _members(triples: Iterable[rdf.Triple], name: str) -> set[str]:
+def _members(triples: Iterable[Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
-    below = ((above, kind) for kind, above in rdf.links(triples, rdf.SUBCLASS))
-    return rdf.members(triples, rdf.reached([rdf.TOMASYS + name], below))
+    below = ((above, kind) for kind, above in rdf.links(triples, SUBCLASS))
+    return rdf.members(triples, rdf.reached([TOMASYS + name], below))
 
 
-def wrong_values(triples: Sequence[rdf.Triple]) -> Iterator[tuple[str, str, str]]:
+def wrong_values(triples: Sequence[Triple]) -> Iterator[tuple[str, str, str]]:
     """Find numbers that are no decimals, unknown operators, and functional properties with several
     values.
 
@@ -575,33 +573,34 @@ def wrong_values(triples: Sequence[rdf.Triple]) -> Iterator[tuple[str, str, str]
     Yields:
         the IRI of the individual, what is wrong, and what would be right.
     """
-    functional = rdf.members(triples, [rdf.FUNCTIONAL])
+    functional = rdf.members(triples, [FUNCTIONAL])
     names = rdf.Names(triples)
     seen: dict[tuple[str, str], Value] = {}
     for subject, predicate, value in triples:
         shown, datatype = value if isinstance(value, Lit) else (value, "")
-        if predicate == rdf.HAS_VALUE and not _is_decimal(value):
-            but = f" but an xsd:{local_name(datatype)}" if datatype not in (*rdf.EXACT, "") else ""
+        if predicate == HAS_VALUE and not _is_decimal(value):
+            but = "" if datatype in (*EXACT, "") else f" but an xsd:{local_name(datatype)}"
             yield subject, f"hasValue {shown!r} is not an xsd:decimal{but}", "a number such as 2.25"
-        if predicate == rdf.QA_OPERATOR and shown not in OPERATORS:
-            yield (
-                subject,
-                f"qa_comparison_operator {shown!r} is unknown",
-                f"one of {' '.join(OPERATORS)}",
-            )
+        if predicate == QA_OPERATOR and shown not in OPERATORS:
+            problem = f"qa_comparison_operator {shown!r} is unknown"
+            yield subject, problem, f"one of {' '.join(OPERATORS)}"
         if predicate in functional and isinstance(value, Lit):
-            one = rdf.value_of(value, names)
-            other = seen.setdefault((subject, predicate), one)
-            if one != other:
-                values = f"the values {other} and {one}"
-                problem = (
-                    f"contradiction: the functional property {local_name(predicate)} has {values}"
-                )
-                yield subject, problem, "keep one of them"
+            yield from _second_value(subject, predicate, rdf.value_of(value, names), seen)
+
+
+def _second_value(
+    subject: str, predicate: str, value: Value, seen: dict[tuple[str, str], Value]
+) -> Iterator[tuple[str, str, str]]:
+    """Say so if a value of a functional property is another one than that which was seen before."""
+    before = seen.setdefault((subject, predicate), value)
+    if before != value:
+        values = f"the values {before} and {value}"
+        problem = f"contradiction: the functional property {local_name(predicate)} has {values}"
+        yield subject, problem, "keep one of them"
 
 
 def _is_decimal(value: str | Lit) -> TypeGuard[Lit]:
-    return isinstance(value, Lit) and value.datatype in rdf.EXACT and rdf.is_well_formed(value)
+    return isinstance(value, Lit) and value.datatype in EXACT and rdf.is_well_formed(value)
 
 
 def _wrong_in(
@@ -647,7 +646,7 @@ class Ontology:
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
     sources: tuple[OntologyFile, ...] = field(repr=False)
-    stated: tuple[rdf.Triple, ...] = field(repr=False)
+    stated: tuple[Triple, ...] = field(repr=False)
     assumed: Mapping[str, str]
     supplies: tuple[Supply, ...]
 
@@ -679,9 +678,8 @@ class Ontology:
         sources = collect([Path(path) for path in ontologies])
         files = [RulesFile.read(Path(path)) for path in rules]
         base = cls.merged(sources, values or {}, operators or {})
-        base = base.with_files(
-            files, [file.rules(base.vocabulary) for file in files], disabled_rules
-        )
+        groups = [file.rules(base.vocabulary) for file in files]
+        base = base.with_files(files, groups, disabled_rules)
         base.check_names(values or {}, disabled_rules)
         for subject, problem, remedy in wrong_values(base.stated):
             raise _wrong_in(subject, sources.files, problem, remedy)
@@ -705,15 +703,11 @@ class Ontology:
         contents = sorted(hashlib.sha256(source.content).hexdigest() for source in sources.files)
         merged = merge(sources.files, values)
         model, content = build_model(merged, sources.files)
-        present = rdf.subjects(content.triples, rdf.QA_OPERATOR)
+        present = rdf.subjects(content.triples, QA_OPERATOR)
         without = {name: iri for name, iri in model.attributes.items() if iri not in present}
         assumed = {name: sign for name, sign in sorted(operators.items()) if name in without}
-        if assumed:
-            more = [
-                (without[name], rdf.QA_OPERATOR, Lit(sign, rdf.XSD + "string"))
-                for name, sign in assumed.items()
-            ]
-            content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
+        more = [(without[name], QA_OPERATOR, Lit(sign, STRING)) for name, sign in assumed.items()]
+        content = replace(content, triples=tuple(sorted((*content.triples, *more), key=str)))
         numbers = {name: format(value.normalize(), "f") for name, value in values.items()}
         texts = enumerated_texts(sources.files)
         known = Vocabulary.of(merged.triples, merged.structure, model.in_states, texts)
@@ -745,20 +739,18 @@ class Ontology:
             files: in the order in which they are given.
             rules: those rules of each file that can be used.
         """
-        found, replaced = list(self.rules), list[tuple[Rule, Rule]]()
+        found = [*self.rules]
+        replaced = list[tuple[Rule, Rule]]()
         for group in rules:
             new = {rule.name: rule for rule in group}
             replaced += [(rule, new[rule.name]) for rule in found if rule.name in new]
-            found = [rule for rule in found if rule.name not in new] + list(group)
-        found = [
-            replace(rule, enabled=False) if rule.name in disabled_rules else rule for rule in found
-        ]
+            found = [*(rule for rule in found if rule.name not in new), *group]
+        found = [_as_enabled(rule, disabled_rules) for rule in found]
+        texts = [file.text for file in files]
         return replace(
             self,
             files=(*self.files, *(file.path for file in files)),
-            content_hash=_digest(
-                self.content_hash, [file.text for file in files], sorted(set(disabled_rules))
-            ),
+            content_hash=_digest(self.content_hash, texts, sorted(set(disabled_rules))),
             content=replace(self.content, rules=_in_order(found), replaced=tuple(replaced)),
             vocabulary=self.vocabulary.with_rules(found),
         )
@@ -769,15 +761,11 @@ class Ontology:
         Raises:
             KnowledgeError: a value names no individual with a hasValue, or there is no such rule.
         """
-        valued = set(map(local_name, rdf.subjects(self.stated, rdf.HAS_VALUE)))
+        valued = set(map(local_name, rdf.subjects(self.stated, HAS_VALUE)))
+        named = {rule.name for rule in self.rules}
         for key, names, known, problem in (
             ("values", values, valued, "the ontology has no individual {} with a hasValue"),
-            (
-                "disabled_rules",
-                disabled_rules,
-                {rule.name for rule in self.rules},
-                "there is no rule {} to switch off",
-            ),
+            ("disabled_rules", disabled_rules, named, "there is no rule {} to switch off"),
         ):
             for name in sorted(set(names).difference(known)):
                 remedy = nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}"
@@ -787,7 +775,7 @@ class Ontology:
         """Return the same ontology with different rules, enabled or not."""
         return replace(self, content=replace(self.content, rules=tuple(rules)))
 
-    def with_facts(self, facts: Iterable[rdf.Triple]) -> Ontology:
+    def with_facts(self, facts: Iterable[Triple]) -> Ontology:
         """Return the same ontology with further facts about individuals."""
         return replace(self, content=replace(self.content, triples=(*self.content.triples, *facts)))
 
@@ -828,15 +816,12 @@ class Ontology:
 
     @cached_property
     def _designs(self) -> Mapping[str, tuple[str, ...]]:
-        solving = sorted(
-            (fact.subject, fact.value) for fact in self.facts if fact.property == "solvesF"
-        )
-        return {
-            name: tuple(
-                one for one, solved in solving if solved == name and one in self.model.designs
-            )
-            for name in self.functions
-        }
+        found: dict[str, tuple[str, ...]] = {}
+        solving = ((str(f.value), f.subject) for f in self.facts if f.property == "solvesF")
+        for function, design in sorted(solving):
+            if function in self.model.functions and design in self.model.designs:
+                found[function] = (*found.get(function, ()), design)
+        return found
 
     def expected(self, design: str) -> Mapping[str, Decimal]:
         """Expected value of each quality attribute of a function design, its performance among
@@ -844,7 +829,7 @@ class Ontology:
         known = self.model.estimated.get(design, {})
         return {name: value for name, value in known.items() if value is not None}
 
-    def assertions(self, state: KnowledgeState) -> tuple[rdf.Triple, ...]:
+    def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.
 
         A component or a quality attribute that the ontology does not have can match no rule, and is
@@ -853,26 +838,22 @@ class Ontology:
         Raises:
             KnowledgeError: a function or a function design is not in the ontology.
         """
-        functions = {
-            *(each.function for each in state.objectives),
-            *(name for name, _ in state.groundings),
-        }
+        functions = {each.function for each in state.objectives}
+        functions.update(name for name, _ in state.groundings)
         designs = {design for _, design in state.groundings}
         model = self.model
         for what, names, known in (
-            ("", functions, model.functions),
-            (" design", designs, model.designs),
+            ("function", functions, model.functions),
+            ("function design", designs, model.designs),
         ):
-            for name in sorted(names.difference(known)):
+            for name in sorted(names - known.keys()):
                 remedy = f"known: {', '.join(sorted(known)) or 'none'}"
-                raise KnowledgeError(
-                    f"the knowledge base has no function{what} {name}", remedy=remedy
-                )
+                raise KnowledgeError(f"the knowledge base has no {what} {name}", remedy=remedy)
         triples = tuple(model.triples(state))
         absent = model.in_states.difference(subject for subject, _, _ in triples)
         return tuple(triple for triple in triples if triple[2] not in absent)
 
-    def asserted(self, state: KnowledgeState, facts: Sequence[rdf.Triple] = ()) -> frozenset[Fact]:
+    def asserted(self, state: KnowledgeState, facts: Sequence[Triple] = ()) -> frozenset[Fact]:
         """The facts of the ontologies and of a state, and further ones."""
         return self.facts.union(rdf.facts_of((*self.assertions(state), *facts), self.names))
 
@@ -883,11 +864,8 @@ class Ontology:
         for name in sorted(functions):
             if name not in self.model.functions:
                 remedy = f"functions in the ontology: {', '.join(self.functions) or 'none'}"
-                other = self._other_namespace
-                if other is not None:
-                    remedy += (
-                        f"; it uses terms of {other}, but those of TOMASys are in {rdf.TOMASYS}"
-                    )
+                if other := self._other_namespace:
+                    remedy += f"; it uses terms of {other}, but those of TOMASys are in {TOMASYS}"
                 yield name, f"there is no function {name}, which the mission needs", remedy
             elif not self.designs(name):
                 remedy = f"add an individual of FunctionDesign with solvesF {name}"
@@ -897,7 +875,7 @@ class Ontology:
     def _other_namespace(self) -> str | None:
         """The namespace in which solvesF is used, if that is not TOMASys' own."""
         for _, predicate, _ in self.stated:
-            if local_name(predicate) == local_name(_SOLVES_F) and predicate != _SOLVES_F:
+            if local_name(predicate) == "solvesF" and predicate != _SOLVES_F:
                 return rdf.namespace(predicate)
         return None
 
@@ -909,6 +887,10 @@ class Ontology:
         """
         for _, problem, remedy in self.unsolved(functions):
             raise KnowledgeError(problem, file=", ".join(map(str, self.files)), remedy=remedy)
+
+
+def _as_enabled(rule: Rule, disabled_rules: Collection[str]) -> Rule:
+    return replace(rule, enabled=False) if rule.name in disabled_rules else rule
 
 
 def _digest(*parts: object) -> str:

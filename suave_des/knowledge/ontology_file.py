@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
@@ -28,17 +28,22 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.files import read_bytes
 from suave_des.knowledge.rdf import (
+    FIRST,
     OWL,
     RDF,
+    RDF_TYPE,
     RDFS,
+    REST,
     XSD,
     Lit,
     Triple,
+    links,
     term_of,
     without_log,
 )
 
 ONTOLOGY_LIMIT_BYTES = 64 * 2**20
+_DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]*\bencoding\s*=\s*[\"']([\w.-]+)[\"']")
 _BASE = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS = "an OWL ontology in RDF/XML or Turtle is expected, as Protégé saves it"
 TURTLE_ENDINGS = (".ttl", ".nt")
@@ -61,7 +66,7 @@ _EXTERNAL = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBL
 RELATIVE_TO = "http://ontology.invalid/a/a/a/a/a/a/a/a/"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OntologyFile:
     """An ontology file that has been read and parsed.
 
@@ -75,13 +80,13 @@ class OntologyFile:
     """
 
     path: Path
-    content: bytes = field(repr=False)
+    content: bytes
     iris: tuple[str, ...]
     is_xml: bool
     base: str | None
     imports: tuple[tuple[str, int], ...]
-    graph: Graph = field(repr=False)
-    triples: tuple[Triple, ...] = field(repr=False)
+    graph: Graph
+    triples: tuple[Triple, ...]
 
     @cached_property
     def _statements(self) -> dict[str, list[Triple]]:
@@ -96,20 +101,18 @@ class OntologyFile:
 
     def value(self, subject: str | Lit | None, predicate: str) -> str | Lit | None:
         """A value of a property; None if there is none."""
-        return next((triple[2] for triple in self.about(subject) if triple[1] == predicate), None)
+        return next((o for _, p, o in self.about(subject) if p == predicate), None)
 
     def kinds(self, subject: str | Lit) -> list[str]:
         """The classes of a subject, sorted."""
-        return sorted(
-            str(value) for _, predicate, value in self.about(subject) if predicate == RDF + "type"
-        )
+        return sorted(str(o) for _, p, o in self.about(subject) if p == RDF_TYPE)
 
     def items(self, node: str | Lit | None) -> Iterator[str | Lit]:
         """The items of a list; one that leads back into itself ends there."""
         seen = {node}
-        while (first := self.value(node, RDF + "first")) is not None:
+        while (first := self.value(node, FIRST)) is not None:
             yield first
-            node = self.value(node, RDF + "rest")
+            node = self.value(node, REST)
             if node in seen:
                 return
             seen.add(node)
@@ -155,9 +158,11 @@ def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | No
 
 def text_of(content: bytes, errors: str = "strict") -> str:
     """Decode a file by its byte order mark or XML declaration, else as UTF-8."""
-    declared = re.search(rb"^\s*<\?xml[^>]*\bencoding\s*=\s*[\"']([\w.-]+)[\"']", content[:200])
-    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
-    encoding = "utf-16" if marked else declared.group(1).decode() if declared else "utf-8-sig"
+    encoding = "utf-8-sig"
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
+    elif declared := _DECLARED_ENCODING.match(content, 0, 200):
+        encoding = declared[1].decode()
     try:
         return content.decode(encoding, errors)
     except UnicodeDecodeError:
@@ -239,11 +244,9 @@ def _parse_xml(path: Path, text: str) -> etree._Element:
     far.
     """
     if external := _EXTERNAL.search(text):
-        line, remedy = (
-            text.count("\n", 0, external.start()) + 1,
-            "only simple internal entities are read",
-        )
+        line = text.count("\n", 0, external.start()) + 1
         problem = "its DOCTYPE or an entity refers to another file"
+        remedy = "only simple internal entities are read"
         raise KnowledgeError(problem, file=path, place=f"line {line}", remedy=remedy)
     # lxml-stubs do not know "internal". Long rules are deeply nested: 256 levels, a hundred atoms,
     # are too few. The larger limit takes the one on expansion away, so it is used only where no
@@ -288,20 +291,21 @@ def _parse_graph(path: Path, text: str, notation: str) -> Graph:
     # goes through triples in the order of the file, each time the same
     graph = Graph("SimpleMemory")
     # it would write the ill-formed 1e3 as 1000
-    before, rdflib.NORMALIZE_LITERALS = (
-        rdflib.NORMALIZE_LITERALS,
-        False,
-    )
+    before = rdflib.NORMALIZE_LITERALS
+    rdflib.NORMALIZE_LITERALS = False
     try:
         with without_log():
             graph.parse(data=text, format=_FORMATS[notation], publicID=RELATIVE_TO + path.stem)
     except Exception as error:  # the parsers raise many kinds, each for a file of another notation
-        reason, place = str(error), None
+        reason = str(error)
+        line: int | str | None = None
         if isinstance(error, SAXParseException):
-            reason, place = error.getMessage(), f"line {error.getLineNumber()}"
+            reason = error.getMessage()
+            line = error.getLineNumber()
         elif found := _BAD_TURTLE.search(reason):
-            reason, place = found[2], f"line {found[1]}"
+            line, reason = found.groups()
         problem = f"not {notation}: {' '.join(reason.split())}"
+        place = f"line {line}" if line else None
         raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
     finally:
         rdflib.NORMALIZE_LITERALS = before
@@ -339,12 +343,11 @@ def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]
     """The texts that data properties can have as values, by property, where the range lists them
     (owl:oneOf).
     """
-    ranges = (
-        (file, *triple) for file in files for triple in file.triples if triple[1] == RDFS + "range"
-    )
-    lists = ((file, name, file.value(kind, OWL + "oneOf")) for file, name, _, kind in ranges)
-    texts = (
-        (name, [each[0] for each in file.items(start) if isinstance(each, Lit)])
-        for file, name, start in lists
-    )
-    return {name: frozenset(found) for name, found in texts if found}
+    texts: dict[str, frozenset[str]] = {}
+    for file in files:
+        for name, kind in links(file.triples, RDFS + "range"):
+            items = file.items(file.value(kind, OWL + "oneOf"))
+            found = [each.text for each in items if isinstance(each, Lit)]
+            if found:
+                texts[name] = frozenset(found)
+    return texts

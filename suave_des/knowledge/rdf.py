@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeGuard, TypeVar
 
 from rdflib import Literal, URIRef
 from rdflib.term import Node
@@ -52,6 +52,9 @@ PREFIXES: Mapping[str, str] = {
     "xsd": XSD,
 }
 
+STRING = XSD + "string"
+BOOLEAN = XSD + "boolean"
+DECIMAL = XSD + "decimal"
 RDF_TYPE = RDF + "type"
 FIRST = RDF + "first"
 REST = RDF + "rest"
@@ -121,18 +124,20 @@ WHOLE = terms(
     "unsignedInt unsignedLong unsignedShort unsignedByte",
 )
 #: Datatypes of exact numbers.
-EXACT = WHOLE | {XSD + "decimal"}
+EXACT = WHOLE | {DECIMAL}
+#: Datatypes of inexact numbers.
+BINARY = terms(XSD, "float double")
 #: Datatypes of numbers.
-NUMERIC = EXACT | {XSD + "float", XSD + "double"}
-_DECIMAL = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*")
+NUMERIC = EXACT | BINARY
+_DECIMAL_NUMBER = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*")
 _WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
 #: How values of a datatype are written; rdflib, which takes more for them, knows the other
 # datatypes of XML Schema.
 _LEXICAL = (
     dict.fromkeys(WHOLE, re.compile(r"[+-]?[0-9]+"))
-    | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
-    | {XSD + "boolean": re.compile(r"true|false|0|1"), XSD + "decimal": _DECIMAL}
+    | dict.fromkeys(BINARY, re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
+    | {BOOLEAN: re.compile(r"true|false|0|1"), DECIMAL: _DECIMAL_NUMBER}
 )
 #: Escapes in texts between quotes, of N-Triples and of rules.
 ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
@@ -141,6 +146,11 @@ ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t
 def is_node(term: str | Lit) -> bool:
     """Whether a term is a blank node, which has no name."""
     return isinstance(term, str) and term.startswith("_:")
+
+
+def is_thing(term: str | Lit) -> TypeGuard[str]:
+    """Whether a term is what ontologies describe: no literal, and no term of OWL, RDF or SWRL."""
+    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
 
 
 def subjects(triples: Iterable[Triple], predicate: str, value: str | Lit | None = None) -> set[str]:
@@ -184,16 +194,15 @@ def term_of(term: Node) -> str | Lit:
     """Convert an IRI or a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
     if not isinstance(term, Literal):
         return str(term)
-    return Lit(
-        str(term), f"@{term.language}" if term.language else str(term.datatype or XSD + "string")
-    )
+    return Lit(str(term), f"@{term.language}" if term.language else str(term.datatype or STRING))
 
 
 @contextmanager
 def without_log() -> Iterator[None]:
     """Keep rdflib's warnings about odd terms off the terminal."""
     logger = logging.getLogger("rdflib.term")
-    before, logger.disabled = logger.disabled, True
+    before = logger.disabled
+    logger.disabled = True
     try:
         with warnings.catch_warnings(action="ignore"):
             yield
@@ -221,11 +230,11 @@ def canonical(value: _Term) -> _Term:
     if isinstance(value, str):
         return value
     text = value.text.strip()
-    if value.datatype == XSD + "decimal" and _DECIMAL.fullmatch(text):
+    if value.datatype == DECIMAL and _DECIMAL_NUMBER.fullmatch(text):
         return Lit(plain_text(Decimal(text) or Decimal(0)), value.datatype)
     if value.datatype in EXACT and _WHOLE_NUMBER.fullmatch(text):
         return Lit(str(int(text)), XSD + "integer")
-    if value.datatype in (XSD + "double", XSD + "float") and _FLOAT.fullmatch(text):
+    if value.datatype in BINARY and _FLOAT.fullmatch(text):
         number = float(text)
         return Lit(str(number), value.datatype) if math.isfinite(number) else value
     return value
@@ -238,7 +247,7 @@ def for_pellet(value: Lit) -> Lit:
     Pellet compares the texts of decimals, and takes one without a decimal place for an integer.
     Stock owlready2 gives it these forms, too.
     """
-    if value.datatype != XSD + "decimal" or not _DECIMAL.fullmatch(value.text.strip()):
+    if value.datatype != DECIMAL or not _DECIMAL_NUMBER.fullmatch(value.text.strip()):
         return value
     text = canonical(value).text
     return Lit(text if "." in text else f"{text}.0", value.datatype)
@@ -267,11 +276,9 @@ class Names:
     def __init__(self, triples: Iterable[Triple]) -> None:
         things = {
             term
-            for triple in triples
-            for term in (triple[0], triple[2])
-            if isinstance(term, str)
-            and not term.startswith(LANGUAGE_NAMESPACES)
-            and triple[2] != SWRL + "Variable"
+            for subject, _, value in triples
+            for term in (subject, value)
+            if value != SWRL + "Variable" and is_thing(term)
         }
         shared = Counter(map(local_name, things))
         self._long = {
@@ -287,7 +294,8 @@ class Names:
 
 def reached(start: Iterable[_T], steps: Iterable[tuple[_T, _T]]) -> set[_T]:
     """Find what steps, from one thing to another, lead to from a start, which is among it."""
-    found, pairs = set(start), list(steps)
+    found = set(start)
+    pairs = list(steps)
     while more := {other for one, other in pairs if one in found} - found:
         found |= more
     return found
@@ -297,7 +305,7 @@ def value_of(value: str | Lit, names: Names) -> Value:
     """Convert the object of a triple: to a short name, a number, a truth value or text."""
     if isinstance(value, str):
         return names.short(value)
-    if value.datatype == XSD + "boolean":
+    if value.datatype == BOOLEAN:
         return value.text.strip() in ("true", "1")
     with suppress(InvalidOperation):
         # NaN never equals NaN
@@ -308,19 +316,14 @@ def value_of(value: str | Lit, names: Names) -> Value:
 
 def is_fact(triple: Triple) -> bool:
     """Whether a triple describes an individual, and not the terms of OWL, RDF or SWRL."""
-    term = triple[2] if triple[1] == RDF_TYPE else triple[1]
-    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
+    return is_thing(triple[2] if triple[1] == RDF_TYPE else triple[1])
 
 
 def memberships(triples: Iterable[Triple]) -> Iterator[tuple[str, str]]:
     """(individual, class) of each triple that says membership; the classes of OWL, RDF and SWRL do
     not count.
     """
-    return (
-        (subject, str(value))
-        for subject, predicate, value in filter(is_fact, triples)
-        if predicate == RDF_TYPE
-    )
+    return ((s, str(o)) for s, p, o in triples if p == RDF_TYPE and is_thing(o))
 
 
 def fact_of(triple: Triple, names: Names) -> Fact:

@@ -26,13 +26,13 @@ from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
 
-from suave_des import knowledge
 from suave_des.caches import SharedEntries, private_cache
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
 from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import (
+    DECIMAL,
     HAS_VALUE,
     OWL,
     RDFS,
@@ -60,8 +60,6 @@ from suave_des.knowledge.state import (
     exact,
 )
 
-_SAME_VALUES = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
-_BINARY = rdf.terms(XSD, "float double")
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
 _SIZELESS = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
 _SIZES = rdf.terms(XSD, "minInclusive minExclusive maxInclusive maxExclusive")
@@ -134,7 +132,7 @@ def regions_of(ontology: Ontology) -> Regions:
     thresholds = sorted(
         exact(number) for number in numbers if abs(number.adjusted()) <= MAX_EXPONENT
     )
-    binary = [where for where, value in literals if value.datatype in _BINARY]
+    binary = [where for where, value in literals if value.datatype in rdf.BINARY]
     reasons = [f"{where} has a binary number, which is compared inexactly" for where in binary]
     return Regions(tuple(thresholds), tuple(dict.fromkeys([*reasons, *_reasons(ontology)])))
 
@@ -159,13 +157,14 @@ def _reasons(ontology: Ontology) -> Iterator[str]:
     """Why rules may distinguish values within a region, whatever the numbers."""
     triples = ontology.content.triples
     # properties with a measured value
-    carriers = reached([HAS_VALUE], rdf.both_ways(rdf.links(triples, *_SAME_VALUES)))
+    same_values = rdf.links(triples, rdf.SUBPROPERTY, OWL + "equivalentProperty")
+    carriers = reached([HAS_VALUE], rdf.both_ways(same_values))
     for rule in ontology.content.enabled_rules:
         yield from _reasons_of(rule, carriers)
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for name, kind in rdf.links(triples, RDFS + "range"):
-        if name in carriers and kind != XSD + "decimal":
+        if name in carriers and kind != DECIMAL:
             yield f"{local_name(name)} has a range other than decimal"
     for name in sorted(rdf.members(triples, [RDFS + "Datatype"])):
         yield f"the ontology defines a datatype, {local_name(name)}"
@@ -464,7 +463,8 @@ class Reasoner:
             raise InputError(
                 f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}"
             )
-        self.base, self.name = base, name
+        self.base = base
+        self.name = name
         self.regions: Regions | None = None
         self._backend = BACKENDS[name](base, limit or TimeLimit(), terms)
         self._known: dict[Hashable, frozenset[Fact]] = {}
@@ -472,9 +472,8 @@ class Reasoner:
         if name == "cached":
             digest = cache_digest(base, terms)
             self.regions = regions_of(base)
-            self._disk = SharedEntries(
-                (folder / "inferences") if folder else private_cache("inferences"), digest
-            )
+            place = folder / "inferences" if folder else private_cache("inferences")
+            self._disk = SharedEntries(place, digest)
             for kept, found in self._disk.read():
                 self._known[kept] = frozenset(_read_fact(*fact) for fact in found)
 
@@ -493,27 +492,18 @@ class Reasoner:
         key: Hashable = inferred_of if self.regions is None else repr(self.regions.key(state))
         if facts:  # whose numbers the regions do not know
             key = state, facts
-        asserted_in = partial(self.base.asserted, facts=facts)
-        inferred = self._known.get(key)
-        if inferred is not None:
-            return self._inference(state, asserted_in, inferred)
-        entailed = self._backend(state, (*self.base.assertions(state), *facts))
-        inferred = frozenset(facts_of(entailed, self.base.names)) - asserted_in(state)
-        if facts or not self._mentions_measured(state, inferred):
-            self._known[key] = inferred
-            if len(self._known) > CACHED_STATES:
-                del self._known[next(iter(self._known))]
-            if self._disk is not None and not facts:
-                self._disk.add(str(key), sorted(map(_written, inferred)))
-        return self._inference(state, asserted_in, inferred)
-
-    def _inference(
-        self,
-        state: KnowledgeState,
-        asserted_in: Callable[[KnowledgeState], frozenset[Fact]],
-        inferred: frozenset[Fact],
-    ) -> Inference:
         base = self.base
+        asserted_in = partial(base.asserted, facts=facts)
+        inferred = self._known.get(key)
+        if inferred is None:
+            entailed = self._backend(state, (*base.assertions(state), *facts))
+            inferred = frozenset(facts_of(entailed, base.names)) - asserted_in(state)
+            if facts or not self._mentions_measured(state, inferred):
+                self._known[key] = inferred
+                if len(self._known) > CACHED_STATES:
+                    del self._known[next(iter(self._known))]
+                if self._disk is not None and not facts:
+                    self._disk.add(str(key), sorted(map(_written, inferred)))
         return Inference(state, asserted_in, inferred, base.objectives, base.groundings)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
@@ -580,31 +570,26 @@ class Reasoner:
     @cached_property
     def expected_attributes(self) -> frozenset[str]:
         """The quality attributes of which some function design expects a value."""
-        designs = [
-            design for function in self.base.functions for design in self.base.designs(function)
-        ]
-        return frozenset(
-            attribute for design in designs for attribute in self.base.expected(design)
-        )
+        base = self.base
+        designs = chain.from_iterable(map(base.designs, base.functions))
+        return frozenset(chain.from_iterable(map(base.expected, designs)))
 
 
 def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
     """Identify all that an inference depends on: ontologies, rules, values, libraries, and our code
     for knowledge.
     """
-    total = hashlib.sha256(f"{_FORMAT}{ontology.content_hash}{terms or ''}".encode())
-    for name in _LIBRARIES:
-        total.update(f"{name} {version(name)}\n".encode())
-    total.update(f"python {platform.python_version()}\n{_code()}".encode())
-    return total.hexdigest()
+    knowledge = f"{_FORMAT}{ontology.content_hash}{terms or ''}"
+    libraries = "".join(f"{name} {version(name)}\n" for name in _LIBRARIES)
+    programs = f"{libraries}python {platform.python_version()}\n{_code()}"
+    return hashlib.sha256(f"{knowledge}{programs}".encode()).hexdigest()
 
 
 @lru_cache(maxsize=1)
 def _code() -> str:
-    total, folder = hashlib.sha256(), Path(knowledge.__file__).parent
-    for path in sorted((*folder.rglob("*.py"), *folder.rglob("*.lark"))):
-        total.update(path.read_bytes())
-    return total.hexdigest()
+    folder = Path(__file__).parent
+    paths = sorted((*folder.rglob("*.py"), *folder.rglob("*.lark")))
+    return hashlib.sha256(b"".join(map(Path.read_bytes, paths))).hexdigest()
 
 
 _READERS: dict[str, Callable[[str], Value]] = {

@@ -19,7 +19,7 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from urllib.parse import urldefrag, urljoin, urlsplit
 from urllib.request import url2pathname
@@ -51,14 +51,12 @@ class Supply:
 
     Attributes:
         importing: the file with the import.
-        line: of the import in it; 0 where it is not known.
         iri: of the imported ontology.
         file: that supplies it.
         reason: how the file was found, for users.
     """
 
     importing: Path
-    line: int
     iri: str
     file: Path
     reason: str
@@ -89,15 +87,13 @@ def collect(given: Sequence[Path]) -> Sources:
     for path in given or [shipped_folder("ontology") / "suave.owl"]:
         _add(files, read_ontology(path))
     # The user's files first, so that the order of imports does not matter.
-    for find in (_among_own_files, _among_all_files):
+    for find in (_own_files_for, _all_files_for):
         for file in files:  # grows meanwhile, by imports of imports
-            for iri, line in file.imports:
+            for iri, _ in file.imports:
                 if any(each.importing == file.path and each.iri == iri for each in supplies):
                     continue
-                found = find(file, iri, files)
-                if found is not None:
-                    source, reason = found
-                    supplies.append(Supply(file.path, line, iri, source.path, reason))
+                for source, reason in islice(find(file, iri, files), 1):
+                    supplies.append(Supply(file.path, iri, source.path, reason))
                     _add(files, source)
     _add_mros_if_used(files, supplies)
     return Sources(tuple(files), tuple(supplies))
@@ -125,17 +121,12 @@ def _is_relative(iri: str) -> bool:
     return urlsplit(iri).netloc == urlsplit(RELATIVE_TO).netloc
 
 
-def _among_own_files(
-    file: OntologyFile, iri: str, files: Sequence[OntologyFile]
-) -> tuple[OntologyFile, str] | None:
-    """Return the file of the user's that supplies an import, and how it was found."""
-    return next(_own_files_for(file, iri, files), None)
-
-
 def _own_files_for(
     file: OntologyFile, iri: str, files: Sequence[OntologyFile]
 ) -> Iterator[tuple[OntologyFile, str]]:
-    """Yield the files of the user's that can supply an import, the one that does first."""
+    """Yield the files of the user's that can supply an import, the one that does first, and how
+    they were found.
+    """
     others = [each for each in files if each is not file and not is_shipped(each)]
     yield from ((other, "by its IRI") for other in others if has_iri(other, iri))
     yield from _where_the_file_says(file, iri)
@@ -158,21 +149,19 @@ def _where_the_file_says(file: OntologyFile, iri: str) -> Iterator[tuple[Ontolog
             yield read_ontology(path), "by its IRI, beside the importing file"
 
 
-def _among_all_files(
+def _all_files_for(
     file: OntologyFile, iri: str, files: Sequence[OntologyFile]
-) -> tuple[OntologyFile, str]:
-    """Return the file that supplies an import, a shipped one where the user has none.
+) -> Iterator[tuple[OntologyFile, str]]:
+    """Yield the files that can supply an import, as _own_files_for does, and then shipped ones.
 
     Raises:
-        KnowledgeError: there is none.
+        KnowledgeError: there is no further one.
     """
-    found = _among_own_files(file, iri, files)
-    if found is not None:
-        return found
+    yield from _own_files_for(file, iri, files)
     for name in _SHIPPED:
         source = read_ontology(shipped_folder("ontology") / f"{name}.owl")
         if has_iri(source, iri) or has_name(source.path, iri):
-            return source, "shipped"
+            yield source, "shipped"
     line = dict(file.imports)[iri]
     raise KnowledgeError(
         f"import {as_written(iri)} does not resolve to a local file",
@@ -194,7 +183,7 @@ def _add_mros_if_used(files: list[OntologyFile], supplies: list[Supply]) -> None
         if _mentions_mros(chain.from_iterable(file.triples)):
             source = read_ontology(shipped_folder("ontology") / "mros.owl")
             reason = "shipped: its terms are used without an import"
-            supplies.append(Supply(file.path, 0, MROS, source.path, reason))
+            supplies.append(Supply(file.path, MROS, source.path, reason))
             files.append(source)
             return
 
@@ -222,10 +211,8 @@ def has_iri(file: OntologyFile, iri: str) -> bool:
 def has_name(path: Path, iri: str) -> bool:
     """Return whether a file has the name of an ontology: the last part of its IRI."""
     last = local_name(_comparable(iri))
-    names = {last}
-    for ending in _ENDINGS:
-        names.add(last.removesuffix(ending))
-    return _without_ending(path.name) in {_without_ending(name) for name in names}
+    names = {last, *map(last.removesuffix, _ENDINGS)}
+    return _without_ending(path.name) in set(map(_without_ending, names))
 
 
 def _without_ending(name: str) -> str:
@@ -293,10 +280,10 @@ def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
             f"not well-formed XML: {error.msg}", file=catalog, remedy="remove it, or correct it"
         ) from error
     for entry in root.iter(_CATALOG_ENTRY):
-        name, uri = entry.get("name", ""), entry.get("uri", "")
-        if not is_iri(name) or not is_iri(uri) or _comparable(name) != _comparable(iri):
-            continue
-        path = catalog.parent / url2pathname(urlsplit(urljoin(entry.base or "", uri)).path)
-        if _is_file(path):
-            return path
+        name = entry.get("name", "")
+        uri = entry.get("uri", "")
+        if is_iri(name) and is_iri(uri) and _comparable(name) == _comparable(iri):
+            path = catalog.parent / url2pathname(urlsplit(urljoin(entry.base or "", uri)).path)
+            if _is_file(path):
+                return path
     return None

@@ -16,6 +16,10 @@ from typing import NamedTuple
 from suave_des.errors import KnowledgeError, shown
 
 Value = str | bool | Decimal
+#: Functions with their designs, or components with their statuses.
+Pairs = tuple[tuple[str, str], ...]
+#: Quality attribute types with their measured values.
+Measured = tuple[tuple[str, Decimal], ...]
 NumberLike = Decimal | float | int | str
 #: Status of an objective whose function has no function design in use.
 UNGROUNDED = "UNGROUNDED"
@@ -73,7 +77,7 @@ def _text(name: str, value: object) -> str:
     return value
 
 
-def _texts(parts: Mapping[str, str] | None) -> tuple[tuple[str, str], ...]:
+def _texts(parts: Mapping[str, str] | None) -> Pairs:
     """Sort texts by name; errors as `_text`."""
     return tuple(sorted((name, _text(name, value)) for name, value in (parts or {}).items()))
 
@@ -109,10 +113,10 @@ class KnowledgeState:
     """
 
     objectives: tuple[ObjectiveState, ...] = ()
-    groundings: tuple[tuple[str, str], ...] = ()
-    components: tuple[tuple[str, str], ...] = ()
-    measurements: tuple[tuple[str, Decimal], ...] = ()
-    measured_since: tuple[tuple[str, Decimal], ...] | None = None
+    groundings: Pairs = ()
+    components: Pairs = ()
+    measurements: Measured = ()
+    measured_since: Measured | None = None
 
     @classmethod
     def of(

@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from suave_des.errors import KnowledgeError, PassingError
@@ -75,10 +74,10 @@ class TimeLimit:
                 problem, remedy=f"give seconds above 0, at most {LONGEST_LIMIT_S:g}"
             )
         self.seconds = seconds
-        self._option = option
+        self._or_more = f", or allow more with {option}" if option else ""
         self._thread: _ReasonerThread | None = None
         self._process = 0
-        self._abandoned: _Abandoned | None = None
+        self._abandoned: tuple[Future[Any], str] | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
         """Do a piece of work and return its result; what it is doing is for the message: "reasoning
@@ -89,7 +88,8 @@ class TimeLimit:
         """
         # a process that was forked has none of the threads
         if self._thread is None or self._process != os.getpid():
-            self._thread, self._process = _ReasonerThread(), os.getpid()
+            self._thread = _ReasonerThread()
+            self._process = os.getpid()
             self._thread.start()
             self._abandoned = None
         self._wait_for_abandoned()
@@ -100,25 +100,27 @@ class TimeLimit:
         except BaseException:
             # After Ctrl-C, too: Java crashes if the process ends as usual meanwhile.
             if not future.done():
-                self._abandoned = _Abandoned(future, doing)
-                _note_abandoned(doing)
+                self._abandoned = future, doing
+                if not _abandoned:
+                    # comes before the end of Java, which was registered earlier
+                    atexit.register(_end_all)
+                _abandoned.append(doing)
             raise
         return future.result()
 
     def _wait_for_abandoned(self) -> None:
         """Wait for earlier work, if it was abandoned; but only once."""
-        earlier = self._abandoned
-        if earlier is None:
+        if self._abandoned is None:
             return
-        if not earlier.was_waited_for:
-            earlier.was_waited_for = True
+        future, doing = self._abandoned
+        if future not in _stuck:
             with suppress(ReasonerTimeoutError):
-                self._wait(earlier.future, earlier.doing, _AGAIN * self.seconds)
-        if not earlier.future.done():
-            _stuck.add(earlier.future)
-            earlier.future.add_done_callback(_stuck.discard)
+                self._wait(future, doing, _AGAIN * self.seconds)
+        if not future.done():
+            _stuck.add(future)
+            future.add_done_callback(_stuck.discard)
             remedy = "try again in another process, or with different rules"
-            raise ReasonerTimeoutError(f"the reasoner is still {earlier.doing}", remedy=remedy)
+            raise ReasonerTimeoutError(f"the reasoner is still {doing}", remedy=remedy)
         self._abandoned = None
 
     def _wait(self, future: Future[_Result], doing: str, limit_s: float) -> None:
@@ -126,7 +128,8 @@ class TimeLimit:
 
         Each wait counts as long as it was to be, however long the process was stopped in it.
         """
-        began_s, used_s, waited_s = time.process_time(), 0.0, 0.0
+        began_s = time.process_time()
+        used_s = waited_s = 0.0
         while True:
             wait_s = max(limit_s - used_s, 0.01 * limit_s)
             if wait((future,), wait_s).done:
@@ -141,31 +144,14 @@ class TimeLimit:
     def exceeded(self, doing: str) -> ReasonerTimeoutError:
         """Make the error for work that took too long."""
         remedy = "look for a rule that matches too many combinations, or computes ever new values from its own"
-        remedy += f", or allow more with {self._option}" if self._option else ""
         problem = f"{doing}: not done after {self.seconds:g} s of CPU time"
-        return ReasonerTimeoutError(problem, remedy=remedy)
+        return ReasonerTimeoutError(problem, remedy=remedy + self._or_more)
 
     def was_starved(self, doing: str, waited_s: float) -> ReasonerTimeoutError:
         """Make the error for work to which the machine gave too little time."""
         problem = f"{doing}: not done after {waited_s:g} s, most of which the machine was busy with other work"
-        remedy = "try again when it is less busy"
-        remedy += f", or allow more with {self._option}" if self._option else ""
+        remedy = f"try again when it is less busy{self._or_more}"
         return ReasonerTimeoutError(problem, remedy=remedy)
-
-
-@dataclass
-class _Abandoned:
-    """Work that took too long, and whether later work has waited for it."""
-
-    future: Future[Any]
-    doing: str
-    was_waited_for: bool = False
-
-
-def _note_abandoned(doing: str) -> None:
-    if not _abandoned:
-        atexit.register(_end_all)  # comes before the end of Java, which was registered earlier
-    _abandoned.append(doing)
 
 
 class _ReasonerThread(threading.Thread):

@@ -24,7 +24,7 @@ from suave_des.imports import hidden
 from suave_des.knowledge.ontology import RULE_IRI, Ontology, Terms
 from suave_des.knowledge.rdf import (
     RDF_TYPE,
-    XSD,
+    STRING,
     Lit,
     Triple,
     canonical,
@@ -398,7 +398,7 @@ class InProcessPellet:
         """
         for warning in sorted(take_warnings(), key=lambda each: _RULE.search(each) is None):
             if named := _RULE.search(warning):
-                rule = self._ontology.content.rules[int(named[1])]
+                rule = self._ontology.rules[int(named[1])]
                 reason = _RULE.sub(rule.name, warning.rpartition("): ")[2])
                 problem = f"Pellet does not use rule {rule.name}: {reason}"
                 remedy = f"the rule is: {rule.text}"
@@ -429,16 +429,21 @@ def dropped_rules(ontology: Ontology) -> dict[Rule, str]:
     Raises:
         KnowledgeError: it cannot read the ontologies.
     """
+    found: dict[Rule, str] = {}
+    for warning in _logged(ontology):
+        for number in _numbers_of([warning]):
+            rule = ontology.rules[number]
+            reason = warning.rpartition("): ")[2].replace(f"{RULE_IRI}{number}", rule.name)
+            found.setdefault(rule, f"Pellet does not use it: {reason}")
+    return found
+
+
+def _logged(ontology: Ontology) -> list[str]:
+    """Load ontologies alone, and return what Java logs of them."""
     with one_at_a_time, _java_errors(ontology):
         take_warnings()
         load_n_triples(ontology.content.n_triples()).isConsistent()
-        found: dict[Rule, str] = {}
-        for warning in take_warnings():
-            for number in _numbers_of([warning]):
-                rule = ontology.content.rules[number]
-                reason = warning.rpartition("): ")[2].replace(f"{RULE_IRI}{number}", rule.name)
-                found.setdefault(rule, f"Pellet does not use it: {reason}")
-        return found
+        return take_warnings()
 
 
 def pattern_problem(text: str) -> str | None:
@@ -475,10 +480,8 @@ def ignored_axioms(ontology: Ontology) -> list[str]:
     """Return what Pellet says of axioms that it ignores, such as a transitivity that contradicts a
     cardinality; each once, as it says it.
     """
-    with one_at_a_time, _java_errors(ontology):
-        load_n_triples(ontology.content.n_triples()).isConsistent()
-        found = [each for each in take_warnings() if each.startswith(_UNSUPPORTED)]
-        return sorted(each.removeprefix(_UNSUPPORTED) for each in dict.fromkeys(found))
+    found = {each for each in _logged(ontology) if each.startswith(_UNSUPPORTED)}
+    return sorted(each.removeprefix(_UNSUPPORTED) for each in found)
 
 
 def trace_contradiction(text: str) -> tuple[str, list[str]]:
@@ -557,5 +560,5 @@ def _read_term(term: JavaObject) -> str | Lit:
         return _name(term)
     text, language, datatype = (str(term.getArgument(number).getName()) for number in range(3))
     if datatype.endswith("PlainLiteral"):  # Pellet keeps all text so
-        datatype = f"@{language}" if language else XSD + "string"
+        datatype = f"@{language}" if language else STRING
     return canonical(Lit(text, datatype))

@@ -22,10 +22,10 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology, Terms
 from suave_des.knowledge.pellet.in_process import java_executable, launcher_environment
-from suave_des.knowledge.rdf import RDF as RDF_IRI
 from suave_des.knowledge.rdf import (
+    DECIMAL,
     RDF_TYPE,
-    XSD,
+    STRING,
     Lit,
     Triple,
     for_pellet,
@@ -33,6 +33,7 @@ from suave_des.knowledge.rdf import (
     reached,
     term_of,
 )
+from suave_des.knowledge.rdf import RDF as RDF_IRI
 
 _PLAIN = RDF_IRI + "PlainLiteral"
 _STATE_IRI = "urn:suave-des:state"
@@ -114,7 +115,7 @@ class StockPellet:
             numbers = [
                 each
                 for each in assertions
-                if isinstance(each[2], Lit) and each[2].datatype == XSD + "decimal"
+                if isinstance(each[2], Lit) and each[2].datatype == DECIMAL
             ]
             others = [triple for triple in assertions if triple not in numbers]
             text += self._with_stand_ins("".join(map(n_triple, others)))
@@ -152,9 +153,9 @@ def _value(term: Node) -> str | Lit:
     """
     found = term_of(term)
     if isinstance(found, Lit) and found.datatype == _PLAIN:
-        return Lit(owlready2.reasoning._unescape_pellet_str(found.text), XSD + "string")
+        return Lit(owlready2.reasoning._unescape_pellet_str(found.text), STRING)
     # () is how Pellet prints no text
-    return Lit("", XSD + "string") if found == Lit("()", XSD + "string") else found
+    return Lit("", STRING) if found == Lit("()", STRING) else found
 
 
 def _below(graph: Graph, name: str) -> set[Node]:

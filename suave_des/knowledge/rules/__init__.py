@@ -15,9 +15,12 @@ from typing import Literal, NamedTuple
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    DECIMAL,
     ESCAPES,
     OWL,
     PREFIXES,
+    STRING,
     SWRL,
     SWRLB,
     XSD,
@@ -179,9 +182,7 @@ class Rule:
 def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
     """Texts that atoms mention as values of a property."""
     found = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
-    return {
-        term.text for term in found if isinstance(term, Lit) and term.datatype == XSD + "string"
-    }
+    return {term.text for term in found if isinstance(term, Lit) and term.datatype == STRING}
 
 
 #: The sign of each built-in that compares two values.
@@ -258,9 +259,9 @@ def mirrored(sign: str) -> str:
 _WORD = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
 #: Literals without quotes, by the datatype that the parser gives them.
 _BARE = {
-    XSD + "boolean": re.compile(r"true|false"),
+    BOOLEAN: re.compile(r"true|false"),
     XSD + "integer": re.compile(r"[+-]?[0-9]+"),
-    XSD + "decimal": re.compile(r"[+-]?(?:[0-9]+\.[0-9]*|\.[0-9]+)"),
+    DECIMAL: re.compile(r"[+-]?(?:[0-9]+\.[0-9]*|\.[0-9]+)"),
     XSD + "double": re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?[0-9]{1,4}"),
 }
 #: Gives the text of an IRI.
@@ -303,17 +304,15 @@ def write_rule(
     """Write a rule for a rules file, one atom a line where one line would be long."""
     word = name if _WORD.fullmatch(name) and name not in ("prefix", "disabled") else _quoted(name)
     start = f"{'' if enabled else 'disabled '}{word}:"
-    sides = [[write_atom(atom, named) for atom in side] for side in (body, head)]
-    line = f"{start} {' ^ '.join(sides[0])}{' ' if body else ''}-> {' ^ '.join(sides[1])}"
+
+    def side(atoms: Iterable[Atom], between: str = " ^ ") -> str:
+        return between.join(write_atom(atom, named) for atom in atoms)
+
+    line = f"{start} {side(body)}{' ' if body else ''}-> {side(head)}"
     if len(line) <= 110:
         return line + "\n"
-    return (
-        f"{start}\n    "
-        + "\n    ^ ".join(sides[0])
-        + "\n    -> "
-        + "\n    ^ ".join(sides[1])
-        + "\n"
-    )
+    between = "\n    ^ "
+    return f"{start}\n    {side(body, between)}\n    -> {side(head, between)}\n"
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:
@@ -333,7 +332,7 @@ def write_term(term: Term, named: Naming = local_name) -> str:
         return term.text
     if term.datatype.startswith("@"):
         return _quoted(term.text) + term.datatype
-    if term.datatype == XSD + "string":
+    if term.datatype == STRING:
         return _quoted(term.text)
     return f"{_quoted(term.text)}^^{full_name(term.datatype)}"
 

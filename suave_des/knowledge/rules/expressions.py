@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from suave_des.knowledge.rdf import OWL, RDF, XSD, Lit, Triple, local_name
+from suave_des.knowledge.rdf import OWL, RDF, STRING, XSD, Lit, Triple, local_name
 
 _BETWEEN = {"intersectionOf": " and ", "unionOf": " or "}
 _BEFORE = ("complementOf", "datatypeComplementOf")
@@ -42,7 +42,7 @@ class _Writer:
     def text(self, term: str | Lit) -> str:
         """Write a term; one that has no name, by what is said of it."""
         if isinstance(term, Lit):
-            return f'"{term.text}"' if term.datatype == XSD + "string" else term.text
+            return f'"{term.text}"' if term.datatype == STRING else term.text
         if not term.startswith("_:") or term in self._above:
             return local_name(term)
         self._above.append(term)
@@ -59,34 +59,31 @@ class _Writer:
         if "onProperty" in parts:
             return self._restriction(parts)
         if "onDatatype" in parts:
-            facets = (each for node in self._items(parts["withRestrictions"]) for each in node)
-            return f"{self.text(parts['onDatatype'])}[{', '.join(facets)}]"
+            facets = ", ".join(self._facets(parts["withRestrictions"]))
+            return f"{self.text(parts['onDatatype'])}[{facets}]"
         if "oneOf" in parts:
             return f"{{{', '.join(map(self.text, self._list(parts['oneOf'])))}}}"
-        for name, word in _BETWEEN.items():
-            if name in parts:
-                return f"({word.join(map(self.text, self._list(parts[name])))})"
-        for name in _BEFORE:
-            if name in parts:
+        for name in filter(parts.__contains__, (*_BETWEEN, *_BEFORE)):
+            if name in _BEFORE:
                 return f"not {self.text(parts[name])}"
+            return f"({_BETWEEN[name].join(map(self.text, self._list(parts[name])))})"
         return "; ".join(f"{name} {self.text(each)}" for name, each in parts.items())
 
     def _restriction(self, parts: dict[str, str | Lit]) -> str:
-        of = next((parts[name] for name in ("onClass", "onDataRange") if name in parts), None)
         name = next((each for each in _QUANTIFIERS if each in parts), "")
         words = [self.text(parts["onProperty"]), _QUANTIFIERS.get(name, "")]
-        words += [self.text(parts[name])] * (name not in ("", "hasSelf"))
-        return " ".join(words) + ("" if of is None else f" {self.text(of)}")
+        if name not in ("", "hasSelf"):
+            words.append(self.text(parts[name]))
+        qualifiers = [parts[each] for each in ("onClass", "onDataRange") if each in parts]
+        return " ".join([*words, *map(self.text, qualifiers[:1])])
 
-    def _items(self, start: str | Lit) -> Iterator[list[str]]:
-        """The facets of each node of a list."""
+    def _facets(self, start: str | Lit) -> Iterator[str]:
+        """The facets of the nodes of a list."""
         for node in self._list(start):
-            facets = self._about.get(str(node), {})
-            yield [
-                f"{_FACETS.get(local_name(name), local_name(name))} {self.text(value)}"
-                for name, value in sorted(facets.items())
-                if name.startswith((XSD, RDF + "langRange"))
-            ]
+            for name, value in sorted(self._about.get(str(node), {}).items()):
+                if name.startswith((XSD, RDF + "langRange")):
+                    word = local_name(name)
+                    yield f"{_FACETS.get(word, word)} {self.text(value)}"
 
     def _list(self, node: str | Lit) -> Iterator[str | Lit]:
         seen = set[str | Lit]()

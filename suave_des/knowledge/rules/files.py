@@ -8,7 +8,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import chain, count
 from pathlib import Path
 from typing import NamedTuple
@@ -18,10 +18,48 @@ import rdflib
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, nearest, with_article
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge import rdf
-from suave_des.knowledge import rules as swrl
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import Lit, local_name
-from suave_des.knowledge.rules import Atom, AtomKind, Named, Place, Rule, RuleError, Term, Variable
+from suave_des.knowledge.rdf import (
+    DECIMAL,
+    EXACT,
+    FIRST,
+    IS_QA_TYPE,
+    LANGUAGE_NAMESPACES,
+    MROS,
+    OWL,
+    RDF,
+    RDF_TYPE,
+    RDFS,
+    REST,
+    STRING,
+    SWRL,
+    SWRLA,
+    SWRLB,
+    TOMASYS,
+    WHOLE,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+)
+from suave_des.knowledge.rules import (
+    ATOM_KINDS,
+    BUILTINS,
+    DIFFERENT,
+    FACT_KINDS,
+    IDENTITIES,
+    SAME,
+    Atom,
+    AtomKind,
+    Named,
+    Place,
+    Rule,
+    RuleError,
+    Term,
+    Variable,
+    computed,
+    write_term,
+)
 from suave_des.knowledge.rules.expressions import in_words
 from suave_des.knowledge.rules.parser import parse_rules
 
@@ -30,13 +68,13 @@ from suave_des.knowledge.rules.parser import parse_rules
 # 0.51's Pellet).
 
 _DECLARED = {
-    rdf.OWL + "Class": "class",
-    rdf.RDFS + "Class": "class",
-    rdf.OWL + "ObjectProperty": "object property",
-    rdf.OWL + "DatatypeProperty": "data property",
-    rdf.OWL + "AnnotationProperty": "annotation property",
-    rdf.RDFS + "Datatype": "datatype",
-    rdf.OWL + "NamedIndividual": "individual",
+    OWL + "Class": "class",
+    RDFS + "Class": "class",
+    OWL + "ObjectProperty": "object property",
+    OWL + "DatatypeProperty": "data property",
+    OWL + "AnnotationProperty": "annotation property",
+    RDFS + "Datatype": "datatype",
+    OWL + "NamedIndividual": "individual",
 }
 
 
@@ -64,15 +102,15 @@ class Vocabulary:
     @classmethod
     def of(
         cls,
-        triples: Sequence[rdf.Triple],
-        structure: Sequence[rdf.Triple],
+        triples: Sequence[Triple],
+        structure: Sequence[Triple],
         individuals: Iterable[str],
         enumerations: Mapping[str, frozenset[str]],
     ) -> Vocabulary:
         """Collect the names in triples of ontologies, and those that their structure uses (see
         Content); the individuals are further ones, that exist only in states.
         """
-        texts = dict.fromkeys(enumerations, frozenset((rdf.XSD + "string",)))
+        texts = dict.fromkeys(enumerations, frozenset((STRING,)))
         literals = [(p, o) for _, p, o in triples if isinstance(o, Lit)]
         return cls(
             kinds=_kinds(triples, individuals),
@@ -81,16 +119,17 @@ class Vocabulary:
             used=frozenset(
                 term for each in (*triples, *structure) for term in each if isinstance(term, str)
             ),
-            whole=frozenset(p for p, literal in literals if literal.datatype in rdf.WHOLE),
+            whole=frozenset(p for p, literal in literals if literal.datatype in WHOLE),
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Vocabulary:
         """Add what the heads of rules use."""
-        used, whole = set(self.used), set(self.whole)
+        used = {*self.used}
+        whole = {*self.whole}
         for atom in (atom for rule in rules for atom in rule.head):
             used |= {atom.predicate, *(t.iri for t in atom.arguments if isinstance(t, Named))}
             # A variable may stand for a whole number.
-            if any(isinstance(t, Variable) or t[-1] in rdf.WHOLE for t in atom.arguments[1:]):
+            if any(isinstance(t, Variable) or t[-1] in WHOLE for t in atom.arguments[1:]):
                 whole.add(atom.predicate)
         return replace(self, used=frozenset(used), whole=frozenset(whole))
 
@@ -105,8 +144,8 @@ class Vocabulary:
     def candidates(self, name: str) -> tuple[str, ...]:
         """IRIs that a bare name can mean: those of TOMASys and mros take precedence over others."""
         found = self.by_name.get(name, ())
-        shared = tuple(iri for iri in found if iri.startswith((rdf.TOMASYS, rdf.MROS)))
-        return shared or found or ((rdf.SWRLB + name,) if rdf.SWRLB + name in swrl.BUILTINS else ())
+        shared = tuple(iri for iri in found if iri.startswith((TOMASYS, MROS)))
+        return shared or found or ((SWRLB + name,) if SWRLB + name in BUILTINS else ())
 
     def fitting(self, name: str, wanted: Collection[str]) -> tuple[str, ...]:
         """IRIs that a bare name can mean; if one alone of several is of the wanted kinds, that."""
@@ -124,27 +163,25 @@ class Vocabulary:
         """Suggest a name of the wanted kinds, as a question."""
         bare = local_name(name)
         known = [
-            each
-            for each, iris in self.by_name.items()
-            if any(self.kinds[iri] & {*wanted} for iri in iris)
+            local_name(iri) for iri, kinds in self.kinds.items() if not kinds.isdisjoint(wanted)
         ]
         if "builtin" in wanted:
-            known += map(local_name, swrl.BUILTINS)
+            known += map(local_name, BUILTINS)
         if bare in known and bare != name:
             return f"did you mean {' or '.join(self.candidates(bare))}?"
         return nearest(bare, known)
 
 
-def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
+def _kinds(triples: Iterable[Triple], individuals: Iterable[str]) -> dict[str, frozenset[str]]:
     """What each name is declared as or used as; further individuals are given."""
     kinds: dict[str, set[str]] = defaultdict(set)
-    kinds[rdf.OWL + "Thing"].add("class")
-    kinds[rdf.OWL + "Nothing"].add("class")
+    kinds[OWL + "Thing"].add("class")
+    kinds[OWL + "Nothing"].add("class")
     for subject, predicate, value in triples:
-        if predicate == rdf.RDF_TYPE and isinstance(value, str):
-            if value in _DECLARED or not value.startswith(rdf.LANGUAGE_NAMESPACES):
+        if predicate == RDF_TYPE and isinstance(value, str):
+            if value in _DECLARED or not value.startswith(LANGUAGE_NAMESPACES):
                 kinds[subject].add(_DECLARED.get(value, "individual"))
-        elif not predicate.startswith(rdf.LANGUAGE_NAMESPACES):
+        elif not predicate.startswith(LANGUAGE_NAMESPACES):
             kinds[subject].add("individual")
             if isinstance(value, str):
                 kinds[value].add("individual")
@@ -153,14 +190,14 @@ def _kinds(triples: Iterable[rdf.Triple], individuals: Iterable[str]) -> dict[st
     return {iri: frozenset(found) for iri, found in kinds.items()}
 
 
-def _ranges(triples: Iterable[rdf.Triple]) -> dict[str, frozenset[str]]:
+def _ranges(triples: Iterable[Triple]) -> dict[str, frozenset[str]]:
     """The datatype of each property that has one range.
 
     All ranges of a property hold at once; which values several of them leave is not worked out.
     """
     ranges: dict[str, set[str]] = defaultdict(set)
-    for subject, value in rdf.links(triples, rdf.RDFS + "range"):
-        if value.startswith(rdf.XSD):
+    for subject, value in rdf.links(triples, RDFS + "range"):
+        if value.startswith(XSD):
             ranges[subject].add(value)
     return {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
 
@@ -176,7 +213,7 @@ class Problem(NamedTuple):
 
     place: Place | None
     message: str
-    remedy: str | None
+    remedy: str | None = None
     is_fatal: bool = True
 
 
@@ -223,11 +260,11 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> Rule:
     Raises:
         RuleError: it cannot; with line and column.
     """
-    for each in fatal_problems(rule, vocabulary):
-        place = f"line {each.line}, column {each.column}" if each.column else f"line {rule.line}"
-        raise RuleError(
-            f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy
-        )
+    for place, message, remedy, is_fatal in rule_problems(rule, vocabulary):
+        if is_fatal:
+            where = str(place or f"line {rule.line}")
+            problem = f"rule {rule.name}: {message}"
+            raise RuleError(problem, file=rule.file, place=where, remedy=remedy)
     return rule
 
 
@@ -256,7 +293,7 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Lit) and not rdf.is_well_formed(term):
             words = f"{term.text!r} is not an xsd:{local_name(term.datatype)}"
-            yield Problem(atom.place(number), words, None)
+            yield Problem(atom.place(number), words)
             return
     if atom.kind == "builtin":
         yield from _builtin_problems(atom, name, is_head=is_head)
@@ -265,7 +302,7 @@ def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iter
         return
     elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
         words = "one argument" if wanted == 1 else "two arguments"
-        yield Problem(atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None)
+        yield Problem(atom.place(), f"{name} takes {words}, not {len(atom.arguments)}")
         return
     for number, term in enumerate(atom.arguments):
         yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
@@ -276,8 +313,7 @@ def _predicate_problem(
 ) -> Problem | None:
     """Check that a class, property or datatype can hold of something, and is used as declared."""
     if "" in (atom.kind, atom.predicate):
-        words = "an atom without a kind that SWRL knows, or without a name"
-        return Problem(atom.place(), words, None)
+        return Problem(atom.place(), "an atom without a kind that SWRL knows, or without a name")
     if atom.kind == "range":
         return _range_problem(atom, name, vocabulary, is_head=is_head)
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
@@ -292,7 +328,7 @@ def _predicate_problem(
         return Problem(atom.place(), words, f"write {name}(?x)")
     found = max(declared.intersection(_PROPERTIES), default=min(declared))
     words = f"{name} is {with_article(found)}, but is used as {with_article(wanted)}"
-    return Problem(atom.place(), words, None)
+    return Problem(atom.place(), words)
 
 
 def _undefined(atom: Atom, wanted: str, vocabulary: Vocabulary) -> Problem:
@@ -325,8 +361,8 @@ def _argument_problems(
     place = atom.place(number)
     takes_value = atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
-        words = f"{name}: {swrl.write_term(term)} is a value, but an individual is needed"
-        yield Problem(place, words, None)
+        words = f"{name}: {write_term(term)} is a value, but an individual is needed"
+        yield Problem(place, words)
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
@@ -342,7 +378,7 @@ def _argument_problems(
 def _asks_of_nothing(atom: Atom, term: Named, vocabulary: Vocabulary) -> bool:
     """Whether an atom asks for a class or property of a name that stands for nothing."""
     is_known = term.iri in vocabulary.used or term.iri in vocabulary.kinds
-    holds_of_all = atom.predicate == rdf.OWL + "Thing" or bool(atom.expression)
+    holds_of_all = atom.predicate == OWL + "Thing" or bool(atom.expression)
     return atom.kind in NOUNS and not holds_of_all and not is_known
 
 
@@ -357,13 +393,13 @@ def _value_problems(
     may_be_whole = is_head or atom.predicate in vocabulary.whole
     if not _is_in(ranges, term, may_be_whole=may_be_whole):
         wanted = " or ".join(sorted(map(local_name, ranges)))
-        words = f"{swrl.write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
+        words = f"{write_term(term)} is not {with_article(wanted)}, the range of {name}: it {consequence}"
         remedy = f"a value of {wanted}"
-        if term.datatype in rdf.WHOLE and rdf.XSD + "decimal" in ranges:
+        if term.datatype in WHOLE and DECIMAL in ranges:
             remedy = f"write {term.text}.0"
         yield Problem(place, words, remedy, is_head)
     elif term.text not in values:
-        words = f"{swrl.write_term(term)} is not among the values of {name}: it {consequence}"
+        words = f"{write_term(term)} is not among the values of {name}: it {consequence}"
         remedy = nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
         yield Problem(place, words, remedy, is_head)
 
@@ -374,16 +410,16 @@ def _is_in(ranges: Collection[str], value: Lit, *, may_be_whole: bool) -> bool:
     A whole number is a decimal, which matches no decimal as they are measured, but one that
     `may_be_whole`.
     """
-    if value.datatype not in rdf.WHOLE:
+    if value.datatype not in WHOLE:
         return value.datatype in ranges
-    taking = rdf.EXACT if may_be_whole else rdf.WHOLE
+    taking = EXACT if may_be_whole else WHOLE
     return not taking.isdisjoint(ranges)
 
 
 def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
-    counts = swrl.BUILTINS.get(atom.predicate)
+    counts = BUILTINS.get(atom.predicate)
     if counts is None:
-        known = sorted(map(local_name, swrl.BUILTINS))
+        known = sorted(map(local_name, BUILTINS))
         suggestion = nearest(name, known) or f"known: {', '.join(known)}"
         yield Problem(atom.place(), f"there is no builtin {name} in Pellet", suggestion)
         return
@@ -415,7 +451,7 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
         places.setdefault(name, atom.place(number))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(filter(None, (individuals[name], values[name])), default=None)
-        yield Problem(place, f"?{name} stands for an individual and for a value", None)
+        yield Problem(place, f"?{name} stands for an individual and for a value")
     bound = _bound_in(rule)
     testing = [atom for atom in rule.body if atom.kind in ("builtin", "range")]
     for atom, number, name in variable_uses(testing):
@@ -430,9 +466,9 @@ def _variable_problems(rule: Rule) -> Iterator[Problem]:
 
 def _bound_in(rule: Rule) -> set[str]:
     """The variables of a rule that facts give a value, or built-ins compute from these."""
-    facts = (atom for atom in rule.body if atom.kind in swrl.FACT_KINDS)
+    facts = (atom for atom in rule.body if atom.kind in FACT_KINDS)
     bound = {name for atom in facts for name in atom.variables()}
-    while more := {name for atom in rule.body for name in swrl.computed(atom, bound)} - bound:
+    while more := {name for atom in rule.body for name in computed(atom, bound)} - bound:
         bound |= more
     return bound
 
@@ -490,11 +526,8 @@ def looked_up(rule: Rule, vocabulary: Vocabulary) -> Rule:
     Raises:
         RuleError: a name is unknown or ambiguous; with line and column.
     """
-    body, head = (
-        tuple(_resolved(atom, vocabulary, rule.file) for atom in side)
-        for side in (rule.body, rule.head)
-    )
-    return replace(rule, body=body, head=head)
+    resolved = partial(_resolved, vocabulary=vocabulary, file=rule.file)
+    return replace(rule, body=tuple(map(resolved, rule.body)), head=tuple(map(resolved, rule.head)))
 
 
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
@@ -503,7 +536,7 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
 
     def named(number: int, word: str) -> Named:
         otherwise = f'declare it, or write "{word}" for a text, ?{word} for a variable'
-        if predicate == rdf.IS_QA_TYPE and number == 1:
+        if predicate == IS_QA_TYPE and number == 1:
             otherwise = f"declare it: an individual {word} of QualityAttributeType"
         return Named(_iri(word, atom.place(number), vocabulary, file, ("individual",), otherwise))
 
@@ -511,9 +544,7 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
         named(n, term.iri) if isinstance(term, Named) else term
         for n, term in enumerate(atom.arguments)
     )
-    return replace(
-        atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments
-    )
+    return Atom(_kind(predicate, arguments, vocabulary), predicate, arguments, atom.places)
 
 
 def _iri(
@@ -527,7 +558,7 @@ def _iri(
     if ":" in name:
         return name
     if name in ("sameAs", "differentFrom") and "class" in kinds:
-        return rdf.OWL + name
+        return OWL + name
     found = vocabulary.fitting(name, kinds)
     if len(found) == 1:
         return found[0]
@@ -543,26 +574,27 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     """Return the kind of an atom's name: as declared if possible, otherwise as its arguments
     suggest.
     """
-    if predicate in (swrl.SAME, swrl.DIFFERENT):
-        return "same" if predicate == swrl.SAME else "different"
-    if predicate.startswith(rdf.SWRLB):
+    if predicate in IDENTITIES:
+        return "same" if predicate == SAME else "different"
+    if predicate.startswith(SWRLB):
         return "builtin"
-    if predicate.startswith(rdf.XSD):
+    if predicate.startswith(XSD):
         return "range"
     declared = vocabulary.kinds.get(predicate, frozenset())
     if "datatype" in declared:
         return "range"
     if len(arguments) < 2:
         return "class"
-    used_for = declared & {"data property", "object property"}
+    takes_value = isinstance(arguments[1], Lit)
+    used_for = declared.intersection(_PROPERTIES)
     if len(used_for) == 1:
-        return "data" if "data property" in used_for else "object"
-    return "data" if isinstance(arguments[1], Lit) else "object"
+        takes_value = "data property" in used_for
+    return "data" if takes_value else "object"
 
 
-_IMP = rdf.SWRL + "Imp"
-_VARIABLE = rdf.SWRL + "Variable"
-ENABLED = rdf.SWRLA + "isRuleEnabled"
+_IMP = SWRL + "Imp"
+_VARIABLE = SWRL + "Variable"
+ENABLED = SWRLA + "isRuleEnabled"
 _PREDICATE_OF = {
     "object": "propertyPredicate",
     "data": "propertyPredicate",
@@ -570,8 +602,9 @@ _PREDICATE_OF = {
     "range": "dataRange",
     "builtin": "builtin",
 }
-_NAMES: Mapping[str, str] = {"same": swrl.SAME, "different": swrl.DIFFERENT}
-_CLASS_OF = {kind: name for name, kind in swrl.ATOM_KINDS.items()}
+_NAMES: Mapping[str, str] = {"same": SAME, "different": DIFFERENT}
+_CLASS_OF = {kind: name for name, kind in ATOM_KINDS.items()}
+
 #: Ends the names that rules without one get.
 WITHOUT_NAME = "without a name"
 #: Begins the IRIs given to variables, as Protégé does.
@@ -586,7 +619,7 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     rules: list[Rule] = []
     numbers = count(1)
     for node, rule in sorted(read.items(), key=lambda each: (each[1].text, each[0])):
-        label = file.value(node, rdf.RDFS + "label")
+        label = file.value(node, RDFS + "label")
         name = label.text if isinstance(label, Lit) else local_name(node)
         if label is None and rdf.is_node(node):
             name = f"rule {next(numbers)} {WITHOUT_NAME}"
@@ -605,9 +638,10 @@ def _read_rule(file: OntologyFile, node: str) -> Rule:
     return Rule("", body, head, enabled, file.path, triples=triples, undeclared=undeclared)
 
 
-def _closure(file: OntologyFile, start: str) -> Iterator[rdf.Triple]:
+def _closure(file: OntologyFile, start: str) -> Iterator[Triple]:
     """The triples of a rule: its own, and those of its lists and atoms, in a fixed order."""
-    waiting, seen = [start], {start}
+    waiting = [start]
+    seen = {start}
     while waiting:
         for triple in sorted(file.about(waiting.pop()), key=lambda triple: triple[1]):
             yield triple
@@ -622,7 +656,7 @@ def _is_part_of_rule(file: OntologyFile, node: str) -> bool:
     write them.
     """
     kinds = file.kinds(node)
-    named = any(kind.startswith(rdf.SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
+    named = any(kind.startswith(SWRL) and kind.endswith(("Atom", "AtomList")) for kind in kinds)
     return named or rdf.is_node(node)
 
 
@@ -631,16 +665,14 @@ def _read_side(file: OntologyFile, rule: str, side: str, names: dict[str, str]) 
     IRI.
     """
     return tuple(
-        _read_atom(file, atom, names) for atom in file.items(file.value(rule, rdf.SWRL + side))
+        _read_atom(file, atom, names) for atom in file.items(file.value(rule, SWRL + side))
     )
 
 
 def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> Atom:
     kinds = file.kinds(node)
-    kind: AtomKind = next((swrl.ATOM_KINDS[name] for name in kinds if name in swrl.ATOM_KINDS), "")
-    predicates = (
-        file.value(node, rdf.SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values())
-    )
+    kind: AtomKind = next((ATOM_KINDS[name] for name in kinds if name in ATOM_KINDS), "")
+    predicates = (file.value(node, SWRL + name) for name in dict.fromkeys(_PREDICATE_OF.values()))
     name = next((str(term) for term in predicates if term is not None), _NAMES.get(kind, ""))
     # With their nodes numbered equal expressions are equal.
     expression = tuple(rdf.numbered_nodes(_closure(file, name), "_:e")) if rdf.is_node(name) else ()
@@ -654,8 +686,8 @@ def _read_atom(file: OntologyFile, node: str | Lit, names: dict[str, str]) -> At
 
 def _arguments_of(file: OntologyFile, node: str | Lit, kind: AtomKind) -> list[str | Lit]:
     if kind == "builtin":
-        return list(file.items(file.value(node, rdf.SWRL + "arguments")))
-    given = (file.value(node, f"{rdf.SWRL}argument{number}") for number in (1, 2))
+        return list(file.items(file.value(node, SWRL + "arguments")))
+    given = (file.value(node, f"{SWRL}argument{number}") for number in (1, 2))
     return [each for each in given if each is not None]
 
 
@@ -674,22 +706,21 @@ def _read_term(
     return Variable(names[term])
 
 
-def triples_of(rule: Rule) -> Sequence[rdf.Triple]:
+def triples_of(rule: Rule) -> Sequence[Triple]:
     """The RDF of a rule, which begins with its node: as an ontology has it, or as one would."""
     if rule.triples:
         return rule.triples
-    label = Lit(rule.name, rdf.XSD + "string")
-    triples: list[rdf.Triple] = [
-        ("_:rule", rdf.RDF_TYPE, _IMP),
-        ("_:rule", rdf.RDFS + "label", label),
+    node = "_:rule"
+    triples: list[Triple] = [
+        (node, RDF_TYPE, _IMP),
+        (node, RDFS + "label", Lit(rule.name, STRING)),
     ]
     for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
-        triples.append((_VARIABLES + variable, rdf.RDF_TYPE, _VARIABLE))
+        triples.append((_VARIABLES + variable, RDF_TYPE, _VARIABLE))
     for side, atoms in (("body", rule.body), ("head", rule.head)):
         nodes = [_write_atom(atom, triples) for atom in atoms]
-        triples.append(
-            ("_:rule", rdf.SWRL + side, _write_list(nodes, rdf.SWRL + "AtomList", triples))
-        )
+        items = _write_list(nodes, SWRL + "AtomList", triples)
+        triples.append((node, SWRL + side, items))
     return triples
 
 
@@ -699,34 +730,33 @@ def _write_term(term: Term) -> str | Lit:
     return term.iri if isinstance(term, Named) else _VARIABLES + term.name
 
 
-def _write_atom(atom: Atom, triples: list[rdf.Triple]) -> str:
+def _write_atom(atom: Atom, triples: list[Triple]) -> str:
     node = f"_:atom{len(triples)}"
-    triples.append((node, rdf.RDF_TYPE, _CLASS_OF[atom.kind]))
+    triples.append((node, RDF_TYPE, _CLASS_OF[atom.kind]))
     if atom.kind in _PREDICATE_OF:
         # Its nodes get names of their own in each atom.
         of_atom = list(rdf.numbered_nodes(atom.expression, f"{node}e"))
         predicate = of_atom[0][0] if of_atom else atom.predicate
-        triples.append((node, rdf.SWRL + _PREDICATE_OF[atom.kind], predicate))
+        triples.append((node, SWRL + _PREDICATE_OF[atom.kind], predicate))
         triples += of_atom
     if atom.kind == "builtin":
-        arguments = _write_list(
-            [_write_term(term) for term in atom.arguments], rdf.RDF + "List", triples
-        )
-        triples.append((node, rdf.SWRL + "arguments", arguments))
+        terms = [_write_term(term) for term in atom.arguments]
+        arguments = _write_list(terms, RDF + "List", triples)
+        triples.append((node, SWRL + "arguments", arguments))
     else:
         for number, term in enumerate(atom.arguments[:2], start=1):
-            triples.append((node, f"{rdf.SWRL}argument{number}", _write_term(term)))
+            triples.append((node, f"{SWRL}argument{number}", _write_term(term)))
     return node
 
 
-def _write_list(items: Sequence[str | Lit], kind: str, triples: list[rdf.Triple]) -> str:
-    rest = rdf.RDF + "nil"
+def _write_list(items: Sequence[str | Lit], kind: str, triples: list[Triple]) -> str:
+    rest = RDF + "nil"
     for item in reversed(items):
         node = f"_:list{len(triples)}"
         triples += [
-            (node, rdf.RDF_TYPE, kind),
-            (node, rdf.FIRST, item),
-            (node, rdf.REST, rest),
+            (node, RDF_TYPE, kind),
+            (node, FIRST, item),
+            (node, REST, rest),
         ]
         rest = node
     return rest

@@ -23,7 +23,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from suave_des.errors import nearest, shown
-from suave_des.knowledge.rdf import PREFIXES, XSD, Lit, is_well_formed, local_name
+from suave_des.knowledge.rdf import (
+    BOOLEAN,
+    DECIMAL,
+    PREFIXES,
+    STRING,
+    XSD,
+    Lit,
+    is_well_formed,
+    local_name,
+)
 from suave_des.knowledge.rules import Atom, Named, Place, Rule, RuleError, Term, Variable
 
 if TYPE_CHECKING:
@@ -55,6 +64,8 @@ _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
 #: What no text may contain: control characters, and halves of surrogate pairs, which no file can
 # encode.
 _FORBIDDEN = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+#: A word between atoms where a name was read.
+_JOINING = re.compile(r"(?<!\S)(?i:and|or|not)\s*\Z")
 _FOUND = re.compile(r"=>|\??[^\s\"<>(),^?]+|.", re.DOTALL)
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*")
 _lock = threading.Lock()
@@ -87,12 +98,11 @@ def parse_rules(
             except UnexpectedInput as error:
                 # which knows what is possible after all that was read
                 state: Any = error.interactive_parser
-                at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
-                at = (
-                    len(text)
-                    if getattr(getattr(error, "token", None), "type", "") == "$END"
-                    else at
-                )
+                token = getattr(error, "token", None)
+                at = len(text)
+                if token is None or token.type != "$END":
+                    blank = _BLANK.match(text, error.pos_in_stream or 0)
+                    at = blank.end()  # type: ignore[union-attr]
                 errors.append(_error(text, at, state.accepts(), file))
             line_end = text.find("\n", at)
             header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
@@ -128,20 +138,26 @@ def _parser() -> tuple[Lark, _Builder]:
 
 def _error(text: str, at: int, accepted: set[str], file: Path | None) -> RuleError:
     """Describe the token that was found, and those that were expected."""
-    words = text[:at].split()[-1:]
-    if words and accepted <= {"_COLON", "_LPAR"} and words[0].lower() in ("and", "or", "not"):
-        at = text.rindex(words[0], 0, at)  # it was taken for the name of a rule or of a predicate
+    word = _JOINING.search(text, 0, at)
+    if word and accepted <= {"_COLON", "_LPAR"}:
+        at = word.start()  # it was taken for the name of a rule or of a predicate
         accepted = {"_ARROW"} if "_COLON" in accepted else {"PREFIXED"}
+    problem, remedy = _problem(text, at, accepted)
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
+    return RuleError(problem, file=file, place=place, remedy=remedy)
+
+
+def _problem(text: str, at: int, accepted: set[str]) -> tuple[str, str | None]:
+    """What is wrong at a place of a text, and what would be right."""
     for word, lacking, remedy in _LACKING:
         if word.match(text, at):
-            return RuleError(f"SWRL has no {lacking}", file=file, place=place, remedy=remedy)
+            return f"SWRL has no {lacking}", remedy
     if text.startswith('"', at) and "STRING" in accepted:
-        return RuleError("this text has no closing quote on its line", file=file, place=place)
+        return "this text has no closing quote on its line", None
     expected, right = next((words, right) for name, words, right in _EXPECTED if name in accepted)
     found = _FOUND.match(text, at)
     instead = f"instead of {shown(found.group(), 32)}" if found else "but the text ends here"
-    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=right)
+    return f"expected {expected} {instead}", right
 
 
 class _Builder:
@@ -201,20 +217,22 @@ class _Builder:
         first = parts[0]
         if isinstance(first, tuple):
             place, name = first
-            return place, Lit(name, XSD + "boolean") if name in ("true", "false") else Named(name)
-        return self._place(first), Variable(
-            first[1:]
-        ) if first.type == "VARIABLE" else self._literal(first, parts[1:])
+            return place, Lit(name, BOOLEAN) if name in ("true", "false") else Named(name)
+        is_variable = first.type == "VARIABLE"
+        term = Variable(first[1:]) if is_variable else self._literal(first, parts[1:])
+        return self._place(first), term
 
     def _literal(self, token: Token, more: Sequence[Any]) -> Lit:
         if token.type == "NUMBER":
             if len(token) > MAX_DIGITS:
                 raise self._wrong(token, "a number of too many digits", f"at most {MAX_DIGITS}")
-            kind = "double" if "e" in token.lower() else "decimal" if "." in token else "integer"
-            return Lit(str(token), XSD + kind)
+            kind = DECIMAL if "." in token else XSD + "integer"
+            if "e" in token.lower():
+                kind = XSD + "double"
+            return Lit(str(token), kind)
         text = self._text(token)
         if not more:
-            return Lit(text, XSD + "string")
+            return Lit(text, STRING)
         if not isinstance(more[0], tuple):
             return Lit(text, str(more[0]))
         datatype = more[0][1]
@@ -228,8 +246,7 @@ class _Builder:
         return literal
 
     def _place(self, token: Token) -> Place:
-        assert token.line is not None and token.column is not None
-        return Place(token.line, token.column)
+        return Place(token.line or 0, token.column or 0)
 
     def _wrong(self, token: Token, problem: str, remedy: str | None = None) -> RuleError:
         self.failed_at = token.start_pos or 0
