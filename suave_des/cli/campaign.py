@@ -29,11 +29,14 @@ from suave_des.cli.options import (
     Seed,
     Trusted,
     any_scenario,
+    argument,
     check_no_use,
     command_line,
     complete_managers,
+    flag,
     flags,
     manager_options,
+    option,
 )
 from suave_des.errors import InputError, number_of
 from suave_des.files import FAMILIES, check_beside, write_beside
@@ -71,14 +74,12 @@ def campaign(
     ],
     resume: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="Continue the campaign in this folder; --runs may add runs."
-        ),
+        option("Continue the campaign in this folder; --runs may add runs.", "DIR"),
     ] = None,
     yes: Trusted = False,
     form: Annotated[
         Literal["suave"] | None,
-        typer.Option("--format", help="Also write the exemplar's own files into DIR/suave."),
+        option("Also write the exemplar's own files into DIR/suave.", None, "--format"),
     ] = None,
     manager_option: ManagerOptions = None,
     quiet: Quiet = False,
@@ -301,13 +302,9 @@ def run(
     ],
     manager: Annotated[
         str,
-        typer.Option(
-            metavar="NAME",
-            help="A manager's name, or module:Class.",
-            autocompletion=complete_managers,
-        ),
+        option("A manager's name, or module:Class.", "NAME", autocompletion=complete_managers),
     ] = "metacontrol",
-    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run number.")] = 1,
+    run_number: Annotated[int, option("Run number.", "K", "--run")] = 1,
     manager_option: ManagerOptions = None,
     files: Files,
 ) -> None:
@@ -328,13 +325,11 @@ def run(
 
 
 def train(
-    manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option(help="Number of training missions.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
-    scenario: Annotated[
-        str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")
-    ] = DEFAULT_SCENARIO,
-    seed: Annotated[int, typer.Option(help="Training seed.")] = 0,
+    manager: Annotated[str, argument("The manager.", "MODULE:CLASS")],
+    missions: Annotated[int, option("Number of training missions.")],
+    out: Annotated[Path, option("File for the training result.", "FILE")],
+    scenario: Annotated[str, option("Scenario to train on.", "SCENARIO")] = DEFAULT_SCENARIO,
+    seed: Annotated[int, option("Training seed.")] = 0,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
     *,
@@ -377,25 +372,25 @@ def train(
 class _Served:
     """Options of a server; a field is named as its option."""
 
-    host: Annotated[str, typer.Option(help="Address.")] = "127.0.0.1"
+    host: Annotated[str, option("Address.")] = "127.0.0.1"
     port: Annotated[
         int | None,
-        typer.Option(
+        option(
+            "Port; 0 for any free one.",
             min=0,
             max=65535,
-            help="Port; 0 for any free one.",
             show_default="3000; with --rosbridge 9090",
         ),
     ] = None
     host_name: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
+        option("A further name by which clients may call this machine.", "NAME"),
     ] = None
     real_time_factor: Annotated[
         float | None,
-        typer.Option(
-            metavar="X",
-            help="Mission seconds per second; 0: advance only on request.",
+        option(
+            "Mission seconds per second; 0: advance only on request.",
+            "X",
             show_default="0; with --rosbridge 1",
         ),
     ] = None
@@ -423,19 +418,15 @@ def serve(
     ],
     rosbridge: Annotated[
         bool,
-        typer.Option(
-            "--rosbridge", help="Serve SUAVE's topics and services by the rosbridge protocol."
-        ),
+        flag("--rosbridge", "Serve SUAVE's topics and services by the rosbridge protocol."),
     ] = False,
     name: Annotated[
         str | None,
-        typer.Option(
-            help="The client's name in results, client:NAME; with --rosbridge.", show_default="ros"
-        ),
+        option("The client's name in results, client:NAME; with --rosbridge.", show_default="ros"),
     ] = None,
     run_number: Annotated[
         int | None,
-        typer.Option("--run", metavar="K", help="Run of the first mission.", show_default="1"),
+        option("Run of the first mission.", "K", "--run", show_default="1"),
     ] = None,
     seed: Seed = 1,
     served: _Served,

@@ -7,10 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from suave_des.cli.console import output, plain, print_table
-from suave_des.cli.options import Overwrite, any_scenario
+from suave_des.cli.options import Overwrite, any_scenario, argument, option
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, make_output_folder, real, write_files
 from suave_des.resources import shipped_folder
@@ -50,21 +48,15 @@ def schema() -> None:
 
 
 def import_config(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="The exemplar's files, in any order.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
-    campaign: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")
-    ] = None,
+    files: Annotated[list[Path], argument("The exemplar's files, in any order.", "FILE...")],
+    out: Annotated[Path, option("Scenario file to write.", "FILE")],
+    campaign: Annotated[Path | None, option("Campaign file to write.", "FILE")] = None,
     revision: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Revision of the files, if they fit several.")
+        str | None, option("Revision of the files, if they fit several.", "NAME")
     ] = None,
     runner_seed: Annotated[
         int | None,
-        typer.Option(
-            metavar="SEED", help="Write the values that the exemplar's runner draws from this seed."
-        ),
+        option("Write the values that the exemplar's runner draws from this seed.", "SEED"),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -104,13 +96,11 @@ def export_config(
     scenario: Annotated[str, any_scenario(False)],
     out: Annotated[
         Path,
-        typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml."),
+        option("Folder for mission_config.yaml and runner_config.yml.", "DIR"),
     ],
     revision: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Revision that is to read them.", show_default="the scenario's"
-        ),
+        option("Revision that is to read them.", "NAME", show_default="the scenario's"),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -139,12 +129,10 @@ def export_config(
 
 
 def tree(
-    manager: Annotated[
-        str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")
-    ],
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="Scenario with the tree's settings.")
-    ] = ("release15"),
+    manager: Annotated[str, argument("bt, bt_extended, or module:Class with a tree.", "MANAGER")],
+    scenario: Annotated[str, argument("Scenario with the tree's settings.", "SCENARIO")] = (
+        "release15"
+    ),
 ) -> None:
     """Draw the behaviour tree of a manager."""
     from suave_des.simulation.mission import Mission

@@ -43,19 +43,20 @@ def page(
     content: object,
     styles: Sequence[str],
     scripts: Sequence[str],
-    **blocks: str,
+    library: str = "",
 ) -> str:
     """Put a page together of assets by their names, a title as plain text, and plain data.
 
-    The scripts share one scope, in their order; `blocks` are further text that the HTML has a place
-    for.
+    The scripts share one scope, in their order; `library` is compressed, and runs before what needs
+    it.
     """
-    return Template(asset(name)).substitute(
+    return Template(asset("page.html")).substitute(
         title=html.escape(title),
         style="\n".join(map(asset, styles)),
+        body=asset(name),
         data=data_text(content),
+        library=library,
         script="(() => {\n'use strict';\n" + "\n".join(map(asset, scripts)) + "\n})();",
-        **blocks,
     )
 
 

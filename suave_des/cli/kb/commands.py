@@ -17,7 +17,16 @@ from suave_des.campaign import progress
 from suave_des.cli.console import counted, errors
 from suave_des.cli.kb import ask, tests
 from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown
-from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
+from suave_des.cli.options import (
+    CommandsUnderHeadings,
+    Headings,
+    Modes,
+    Quiet,
+    Seed,
+    Workers,
+    argument,
+    option,
+)
 
 if TYPE_CHECKING:
     from suave_des.kb.decision_table import DecisionTable
@@ -30,11 +39,9 @@ FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
 OwlFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="FILE", help="An OWL file; its previous version is kept as FILE.bak, FILE.bak2, ..."
-    ),
+    argument("An OWL file; its previous version is kept as FILE.bak, FILE.bak2, ...", "FILE"),
 ]
-RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
+RuleName = Annotated[str, argument("Name of a rule of the file.", "NAME")]
 FindingsFormat = Literal["text", "json"]
 FailOn = Literal["error", "warn"]
 
@@ -42,11 +49,9 @@ FailOn = Literal["error", "warn"]
 def check(
     options: KnowledgeOptions,
     modes: Modes = None,
-    fail_on: Annotated[
-        FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")
-    ] = "error",
+    fail_on: Annotated[FailOn, option("Lowest level that makes the exit status 1.")] = "error",
     time_limit: TimeLimitS = 60.0,
-    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = "text",
+    form: Annotated[FindingsFormat, option("Output format.", None, "--format")] = "text",
 ) -> None:
     """Check ontologies and rules.
 
@@ -119,9 +124,7 @@ def _why_unreadable(rule: Rule, text: str, base: Ontology) -> str | None:
 
 def add_rule(
     file: OwlFile,
-    rule: Annotated[
-        str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')
-    ],
+    rule: Annotated[str, argument('The rule, "name: body -> head", or a .swrl file.', "RULE")],
 ) -> None:
     """Add a rule, or those of a file, to an OWL file; nothing else changes."""
     from suave_des.kb.rule_editor import add_rules, unused_backup
@@ -166,19 +169,15 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
 def try_(
     on: Annotated[
         Path,
-        typer.Option(
-            "--on",
-            metavar="DIR",
-            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
+        option(
+            "Folder of run, of a campaign that recorded its knowledge, or of such folders.", "DIR"
         ),
     ],
     rule: Annotated[
         str | None,
-        typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.'),
+        argument('Rule to try, "name: body -> head", or a .swrl file.', "RULE"),
     ] = None,
-    disable: Annotated[
-        str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
-    ] = None,
+    disable: Annotated[str | None, option("Evaluate without this rule.", "NAME")] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
     """Show when a rule would have fired in recorded missions, and what it would have changed.
@@ -197,12 +196,7 @@ class MissionOptions:
 
     missions: Annotated[
         int | None,
-        typer.Option(
-            "--missions",
-            min=1,
-            metavar="N",
-            help="Run N missions with each, and compare them in pairs.",
-        ),
+        option("Run N missions with each, and compare them in pairs.", "N", min=1),
     ] = None
     modes: Modes = None
     seed: Seed = 1
@@ -215,13 +209,13 @@ def diff(
     mission_options: MissionOptions,
     one: Annotated[
         Path,
-        typer.Argument(
-            metavar="A",
-            help="An ontology, a .swrl file of rules to add, or a decision table (.csv, or rosa,"
+        argument(
+            "An ontology, a .swrl file of rules to add, or a decision table (.csv, or rosa,"
             " planta).",
+            "A",
         ),
     ],
-    other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
+    other: Annotated[Path, argument("The same.", "B")],
     max_failed: MaxFailed = 2,
 ) -> None:
     """Compare two ontologies, sets of rules or decision tables: axioms, decisions, missions.

@@ -17,7 +17,7 @@ from rich.text import Text
 
 from suave_des.cli.console import counted, errors, output
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS, shown
-from suave_des.cli.options import KnowledgeFiles
+from suave_des.cli.options import KnowledgeFiles, argument, flag, option
 from suave_des.errors import InputError, number_of, unknown
 from suave_des.errors import shown as quoted
 from suave_des.files import check_output_file, write_files
@@ -41,9 +41,7 @@ class TestOptions(KnowledgeFiles):
 
     scenario: Annotated[
         str | None,
-        typer.Option(
-            "--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name."
-        ),
+        option("Scenario instead of the one that files name.", "SCENARIO"),
     ] = None
     time_limit: TimeLimitS = 60.0
 
@@ -76,17 +74,15 @@ class MutationOptions:
 
     mutate: Annotated[
         bool,
-        typer.Option(
-            "--mutate", help="Make small mistakes in rules; report those that no test notices."
-        ),
+        flag("--mutate", "Make small mistakes in rules; report those that no test notices."),
     ] = False
     mutants: Annotated[
         int | None,
-        typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all."),
+        option("Number of mutants; by default all.", "N", min=1),
     ] = None
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
+        option("Only mutants of this rule; repeatable.", "NAME"),
     ] = None
     max_failed: MaxFailed = 1
 
@@ -101,32 +97,22 @@ def test(
     mutation: MutationOptions,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE", help="Tests in YAML; by default those of the shipped rules."
-        ),
+        argument("Tests in YAML; by default those of the shipped rules.", "FILE"),
     ] = None,
     select: Annotated[
         str | None,
-        typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name."),
+        option("Only tests with this text in their name.", "TEXT", "-k"),
     ] = None,
     junit_xml: Annotated[
         Path | None,
-        typer.Option(
-            "--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML."
-        ),
+        option("Write the results as JUnit XML.", "FILE", "--junit-xml", "--junitxml"),
     ] = None,
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="Show what the tests cover.")
-    ] = False,
+    coverage: Annotated[bool, flag("--coverage", "Show what the tests cover.")] = False,
     from_mission: Annotated[
         Path | None,
-        typer.Option(
-            "--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."
-        ),
+        option("Write a recorded mission's decisions as tests.", "DIR"),
     ] = None,
-    write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", help="File for the tests.")
-    ] = None,
+    write: Annotated[Path | None, option("File for the tests.", "FILE")] = None,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
 

@@ -42,7 +42,7 @@ function show(id, traces, layout) {
   const place = byId(id);
   if (!traces.length) {
     if (place.classList.contains('js-plotly-plot')) Plotly.purge(place);
-    place.replaceChildren(element('div', { class: 'empty' }, 'nothing to show with this choice'));
+    place.replaceChildren(element('div.empty', 'nothing to show with this choice'));
     return;
   }
   if (place.firstChild?.className === 'empty') place.replaceChildren();

@@ -60,7 +60,7 @@ function drawGlow(d, [x, y], size, inner, outer) {
 
 function drawScene(surface, play, moment, view) {
   const { drawing: d, width, height } = surface;
-  const { pose, clarity } = moment;
+  const { clarity } = moment;
   const water = Object.fromEntries(Object.keys(CLEAR).map((key) => [key, mixed(MURKY[key], CLEAR[key], clarity)]));
   const reach = 7 + 17 * clarity; // how far the spectator sees, in m
   const camera = new Camera(view.azimuth, view.pitch, view.distance, view.target, width, height);
@@ -74,7 +74,7 @@ function drawScene(surface, play, moment, view) {
   drawWay(c);
   drawShadow(c);
   drawFootprint(c);
-  drawVehicle(c, pose);
+  drawVehicle(c);
   drawSnow(c);
   drawMurk(c);
 }
@@ -224,10 +224,10 @@ function drawWay({ d, camera, fog, play, moment }) {
   let last = null;
   for (let i = 0; i <= moment.index + 3; i += 3) {
     const isEnd = i > moment.index;
-    const [x, y, z] = isEnd ? [moment.pose.x, moment.pose.y, moment.pose.z] : [track.x[i], track.y[i], track.z[i]];
+    const [x, y, z] = isEnd ? [moment.pose.x, moment.pose.y, moment.pose.z] : [track.x_m[i], track.y_m[i], track.z_m[i]];
     const at = camera.project(x, y, z);
     if (at && last) {
-      const age = moment.t - track.t[Math.min(i, moment.index)];
+      const age = moment.t - track.t_s[Math.min(i, moment.index)];
       const alpha = fog(at[2]) * (0.3 + 0.7 * Math.exp(-age / 45));
       if (alpha > 0.04) {
         d.globalAlpha = alpha;
@@ -296,15 +296,15 @@ function drawFootprint({ d, camera, moment }) {
   }
 }
 
-function drawVehicle({ d, camera, moment, water, clarity }, pose) {
-  const { turn, place } = bodyToWorld(pose, VEHICLE_SCALE);
+function drawVehicle({ d, camera, moment, water, clarity }) {
+  const { turn, place } = bodyToWorld(moment.pose, VEHICLE_SCALE);
   const shapes = [];
   for (const face of HULL) {
     const normal = turn(face.normal);
     const points = face.points.map(place);
     const centre = points[0].map((_, axis) => points.reduce((sum, point) => sum + point[axis], 0) / 4);
     const towards = centre.map((value, axis) => camera.eye[axis] - value);
-    if (normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2] <= 0) continue;
+    if (dot(normal, towards) <= 0) continue;
     const tint = mixed(face.tint, water.far, 0.1 + 0.12 * (1 - clarity));
     shapes.push({ depth: Math.hypot(...towards), draw: () => {
       d.beginPath();
