@@ -5,6 +5,7 @@ for a browser.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -45,6 +46,8 @@ from suave_des.files import (
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.reality.validation import Validation
     from suave_des.records.mission_folder import MissionRecord
@@ -132,10 +135,11 @@ def compare(
         check_ending(out, _ENDINGS, "a table")
         check_output_file(out, overwrite=True)
     names, columns, points = map(comma_separated, (managers, metrics, by))
-    if (assisted_by is None) != (population is None):
+    simulated = [each for each in (assisted_by, population) if each is not None]
+    if len(simulated) == 1:
         remedy = "give both: suave-des campaign makes them"
         raise InputError("--assisted-by and --population are needed together", remedy=remedy)
-    if assisted_by is not None:
+    if simulated:
         unused = {
             "--by": by,
             "--against": against,
@@ -145,14 +149,10 @@ def compare(
         check_no_use(unused, "with --assisted-by")
     labels = _labels(label)
     missions = read_missions(results, labels)
-    simulated = [
-        read_missions([folder], labels)
-        for folder in (assisted_by, population)
-        if folder is not None
-    ]
     comparison: Written
     if simulated:
-        comparison = compare_assisted(missions, simulated, names, columns)
+        others = [read_missions([each], labels) for each in simulated]
+        comparison = compare_assisted(missions, others, names, columns)
     else:
         groups = grouped(missions, names, columns, points)
         with counted("comparing", errors()) as show:
@@ -251,17 +251,14 @@ def validate(
         made: dict[str, object] = {"runs_file": _provenance(runs_file, recorded.files[runs_file])}
     else:
         runs = options.get("runs", -(-_RUNS // max(1, len(conditions))))
-        result = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
-        simulated = result.frame()
-        if not set(result.campaign.spec.managers) <= set(simulated["manager"]):
-            exit_telling_failures(result)  # there is nothing to compare
+        result, simulated = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
         made = {"scenario": result.campaign.loaded.scenario.name, "runs": runs}
     validation = compare(
         real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed
     )
     _print_validation(validation, real)
     sources = {
-        "data": [_provenance(path, digest) for path, digest in real.files.items()],
+        "data": list(starmap(_provenance, real.files.items())),
         "targets": list(map(_shown, targets_paths)),
         "seed": seed,
     }
@@ -289,15 +286,19 @@ def _recorded(file: Path, columns: Sequence[str], managers: Sequence[str], optio
 
 def _simulated(
     name: str, managers: Sequence[str], options: Given, files: Files, *, quiet: bool
-) -> CampaignResult:
-    """Run the missions to compare."""
+) -> tuple[CampaignResult, DataFrame]:
+    """Run the missions to compare; exit if a manager has none."""
     from suave_des.campaign.campaign import run_campaign
 
     if "out" in options:
         check_beside(options["out"], VALIDATION_FILES)
     settings: Given = {"workers": None, "command": command_line(), **options}
     with progress.shown(name, quiet=quiet) as show:
-        return run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
+        result = run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
+    frame = result.frame()
+    if not set(result.campaign.spec.managers) <= set(frame["manager"]):
+        exit_telling_failures(result)
+    return result, frame
 
 
 def _print_validation(validation: Validation, real: Runs) -> None:

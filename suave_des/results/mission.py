@@ -37,6 +37,7 @@ from suave_des.results.style import (
     component_words,
     function_mode_words,
     function_words,
+    handle,
     mode_words,
     plain,
 )
@@ -114,11 +115,9 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of failures, by failed component."""
-    changes = (
-        (t_s, name, FAILED if is_failed else "")
-        for t_s, name, is_failed in component_changes(record)
-    )
-    return _spans(changes, record.end_s)
+    changes = component_changes(record)
+    failures = ((t_s, name, FAILED if is_failed else "") for t_s, name, is_failed in changes)
+    return _spans(failures, record.end_s)
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
@@ -295,35 +294,28 @@ def draw_map(record: MissionRecord) -> style.Picture:
 def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> Iterator[Line2D]:
     moving = [mode for mode in colours if mode not in _IDLE_MODES]
     for mode in (*moving, *_IDLE_MODES[1:2] * (len(moving) < len(colours))):
-        yield Line2D([], [], label=style.text(mode_words(mode)), **_way_look(colours, mode))
-    yield Line2D([], [], **_PIPELINE, label="pipeline")
-    yield Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)")
+        yield handle(label=style.text(mode_words(mode)), **_way_look(colours, mode))
+    yield handle(**_PIPELINE, label="pipeline")
+    yield handle(**_VISIBILITY, label="visibility; dotted: thresholds (c)")
     if battery_level(record) is not None:
-        yield Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
-        yield Line2D(
-            [], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station"
-        )
-    yield Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start")
+        yield handle(color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
+        yield handle(color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station")
+    yield handle(color=style.BLACK, lw=0, marker="o", ms=4, label="start")
     if adaptations(record):
-        yield Line2D(
-            [], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation"
-        )
+        yield handle(color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation")
     for mark in marks:
         symbol = rf"$\mathbf{{{mark.letter}}}$"
-        yield Line2D([], [], lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
+        yield handle(lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
 
 
 def mode_colours(record: MissionRecord) -> dict[str, str]:
     """Return a colour for each mode, in the order of appearance; what does not move the vehicle is
     grey.
     """
-    modes = list(dict.fromkeys(record.trajectory["mode"]))
     known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
-    others = zip(
-        [mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False
-    )
-    colours = known | dict(others)
-    return {mode: colours[mode] for mode in modes}
+    others = cycle(style.OTHER_MODES)
+    modes = record.trajectory["mode"].unique()
+    return {mode: known.get(mode) or next(others) for mode in modes}
 
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
@@ -737,6 +729,5 @@ def _sentences(changes: Sequence[Adaptation], rules: Rules) -> list[str]:
 def _sentence(each: Adaptation, rules: Sequence[str]) -> str:
     before, after = (function_mode_words(each.function, mode) for mode in (each.before, each.after))
     cause = f"rule {', '.join(rules)}" if rules else each.cause
-    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}" + (
-        f" ({cause})" if cause else ""
-    )
+    because = f" ({cause})" if cause else ""
+    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}{because}"

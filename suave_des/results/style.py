@@ -13,6 +13,7 @@ from typing import Any
 
 import matplotlib.style
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from suave_des import domain
 from suave_des.results.groups import printable
@@ -104,6 +105,11 @@ class Picture(Figure):
         with publication():
             self.savefig(picture, format="png", dpi=160)
         return picture.getvalue()
+
+
+def handle(**look: Any) -> Line2D:
+    """Return what stands for a line or a marker in a legend."""
+    return Line2D([], [], **look)
 
 
 @contextmanager

@@ -200,9 +200,10 @@ def why_not(
     names = names or []
     _tell_of_identities(questions.base, names)
     limit = TimeLimit(time_limit, "--time-limit")
-    answers = [
-        limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")
-        for name in names or sorted({rule.name for rule in questions.base.rules})
-    ]
-    told = [str(answer) for answer in answers if names or not answer.fires]
+    told = []
+    for name in names or sorted({rule.name for rule in questions.base.rules}):
+        task = f"finding out why {name} does not fire"
+        answer = limit.run(partial(questions.why_not, name, state), task)
+        if names or not answer.fires:
+            told.append(str(answer))
     print("\n".join(told) or "all rules fire")

@@ -29,9 +29,7 @@ from suave_des.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from suave_des.kb.decision_table import DecisionTable
     from suave_des.kb.difference import MissionDifference
-    from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.rules import Rule
 
@@ -224,30 +222,31 @@ def diff(
     scenario's. Decisions are compared in every state; missions with the same number use common
     random numbers.
     """
-    from suave_des.kb.decision_table import manager_of
+    from suave_des.kb.decision_table import find_table, manager_of
     from suave_des.kb.difference import compare_axioms
     from suave_des.kb.table_difference import compare_deciders
 
-    tables = list(map(manager_of, (one, other)))
-    both = [_side(options, file) for file in (one, other)]
+    files = (one, other)
+    tables = list(map(manager_of, files))
+    both = [options if manager_of(file) else options.with_file(file) for file in files]
     lines = list[str]()
     with counted("states", errors()) as on_count:
         if any(tables):
-            deciders = [_decider(options, file) for file in (one, other)]
+            deciders = [
+                find_table(file) if manager_of(file) else options.with_file(file).knowledge()
+                for file in files
+            ]
             base = both[tables.index(None) if None in tables else 0].knowledge()
             difference = compare_deciders(base, deciders, max_failed, on_count)
         else:
             before, after = (each.knowledge() for each in both)
             lines += _changed_axioms(*compare_axioms(before.base, after.base))
             difference = before.diff(after, max_failed, on_count)
-    missions = None
+    lines += difference.lines()
     if mission_options.missions is not None:
-        missions = _compared_missions(both, tables, mission_options)
-    print(*lines, *difference.lines(), sep="\n")
-    if missions is not None:
-        print()
-        print(shown(missions[0].table(difference)))
-        print(*missions[1], sep="\n")
+        missions, about = _compared_missions(both, tables, mission_options)
+        lines += ["", shown(missions.table(difference)), *about]
+    print(*lines, sep="\n")
 
 
 def _changed_axioms(removed: Sequence[str], added: Sequence[str]) -> Iterator[str]:
@@ -255,19 +254,6 @@ def _changed_axioms(removed: Sequence[str], added: Sequence[str]) -> Iterator[st
         yield f"axioms and rules: {len(removed)} removed, {len(added)} added"
     yield from (f"  - {text}" for text in removed)
     yield from (f"  + {text}" for text in added)
-
-
-def _side(options: ReasonerOptions, file: Path) -> ReasonerOptions:
-    """Return the options with what is compared; a decision table changes none."""
-    from suave_des.kb.decision_table import manager_of
-
-    return options if manager_of(file) else options.with_file(file)
-
-
-def _decider(options: ReasonerOptions, file: Path) -> KnowledgeBase | DecisionTable:
-    from suave_des.kb.decision_table import find_table, manager_of
-
-    return find_table(file) if manager_of(file) else options.with_file(file).knowledge()
 
 
 def _compared_missions(

@@ -26,9 +26,8 @@ function prepare(mission) {
       play.swath.push({ x: track.x_m[i], y: track.y_m[i], half: altitude * TANGENT, t: track.t_s[i] });
     }
   }
-  const xs = [...track.x_m, ...PIPELINE.map((each) => each[0])];
-  const ys = [...track.y_m, ...PIPELINE.map((each) => each[1])];
-  const [[x0, x1], [y0, y1]] = [ends(xs), ends(ys)];
+  const [x0, x1] = ends([...track.x_m, ...PIPELINE.map((each) => each[0])]);
+  const [y0, y1] = ends([...track.y_m, ...PIPELINE.map((each) => each[1])]);
   play.bounds = { x0: x0 - 1, x1: x1 + 1, y0: y0 - 1, y1: y1 + 1 };
   const lengths = mission.way.map(([x, y]) => lengthAlong(x, y));
   let [from, to] = [Infinity, -Infinity];
@@ -94,7 +93,8 @@ function momentOf(play, asked) {
   const next = Math.min(index + 1, track.t_s.length - 1);
   const share = next > index ? clamp((t - track.t_s[index]) / (track.t_s[next] - track.t_s[index]), 0, 1) : 0;
   const between = (values) => mix(values[index], values[next], share);
-  const turn = Math.atan2(Math.sin(track.yaw_rad[next] - track.yaw_rad[index]), Math.cos(track.yaw_rad[next] - track.yaw_rad[index]));
+  const turned = track.yaw_rad[next] - track.yaw_rad[index];
+  const turn = Math.atan2(Math.sin(turned), Math.cos(turned));
   const pose = {
     x: between(track.x_m), y: between(track.y_m), z: between(track.z_m),
     roll: between(track.roll_rad), pitch: between(track.pitch_rad), yaw: track.yaw_rad[index] + share * turn,
@@ -123,14 +123,13 @@ function makePane(play) {
     scene: canvas('scene', `The vehicle of ${play.manager} over the sea bed`), map: canvas('map', 'The mission from above'),
     side: canvas('profile', 'The vehicle from the side'), state: element('div.state'),
     altitude: element('b'), visibility: element('b'), mode: element('span.mode'),
-    distance: element('b'), lamps: element('span.lamps'), seeing: element('span.figure'),
+    distance: element('b'), lamps: element('span.lamps'),
   };
   for (let n = 1; n <= DATA.scenario.thrusters; n++) parts.lamps.append(element('i', { title: `thruster ${n}` }, n));
-  const figure = (label, ...values) => element('span.figure', element('small', label), values);
-  parts.seeing.append(element('small', 'visibility'), parts.visibility);
+  const figure = (label, value) => element('span.figure', element('small', label), value);
   const stage = element('div.stage', parts.scene, parts.map,
     element('div.hud.top', element('div.manager', play.manager), parts.state),
-    element('div.hud.bottom', figure('altitude', parts.altitude), parts.seeing,
+    element('div.hud.bottom', figure('altitude', parts.altitude), figure('visibility', parts.visibility),
       figure('inspected', parts.distance), figure('thrusters', parts.lamps), figure('mode', parts.mode)));
   parts.mode.parentElement.classList.add('word');
   const panel = makePanel(play);
@@ -172,7 +171,7 @@ function drawPane({ play, box, parts, panel }, t) {
   }
   parts.altitude.textContent = `${moment.altitude.toFixed(1)} m`;
   parts.visibility.textContent = moment.visibility === null ? '–' : `${moment.visibility.toFixed(1)} m`;
-  parts.seeing.classList.toggle('blind', moment.visibility !== null && !moment.sees);
+  parts.visibility.classList.toggle('blind', moment.visibility !== null && !moment.sees);
   parts.distance.textContent = `${moment.distance.toFixed(1)} m`;
   parts.mode.replaceChildren(element('i'), moment.mode || 'no mode yet');
   parts.mode.firstChild.style.color = seaColour(moment.mode);

@@ -3,23 +3,18 @@
 const { results, ways, made } = DATA;
 const { drawn } = results;
 const { columns, groups, titles } = drawn;
-const COUNT = columns.group.length;
 const METRICS = Object.keys(titles);
 const state = { hidden: new Set(), metric: METRICS[0], found: 'all', sweep: {}, reference: 0, run: null, group: null };
 const seedOf = (row) => columns.seed[columns.seed.length === 1 ? 0 : row];
 const shownGroups = () => groups.map((_, number) => number).filter((number) => !state.hidden.has(number));
 
 function rowsOf(number) {
-  const rows = [];
-  for (let row = 0; row < COUNT; row++) {
-    if (columns.group[row] !== number) continue;
-    if (state.found !== 'all' && String(columns.found[row]) !== state.found) continue;
-    if (drawn.swept.some((name) => state.sweep[name] && String(columns[name][row]) !== state.sweep[name])) continue;
-    rows.push(row);
-  }
-  return rows;
+  return columns.group.map((_, row) => row).filter((row) => columns.group[row] === number
+    && (state.found === 'all' || String(columns.found[row]) === state.found)
+    && drawn.swept.every((name) => !state.sweep[name] || String(columns[name][row]) === state.sweep[name]));
 }
 let chosen = new Map();
+const ofMetric = (row) => columns[state.metric][row];
 const known = (rows, name) => rows.filter((row) => columns[name][row] !== null);
 
 function refresh() {
@@ -39,7 +34,7 @@ function refresh() {
 function drawDistribution() {
   const traces = [];
   for (const [number, rows] of chosen) {
-    const values = known(rows, state.metric).map((row) => columns[state.metric][row]);
+    const values = known(rows, state.metric).map(ofMetric);
     if (!values.length) continue;
     traces.push({
       ...distribution(values), mode: 'lines', name: plain(groups[number]),
@@ -58,14 +53,14 @@ function drawSpread() {
   for (const [number, rows] of chosen) {
     const some = thinned(known(rows, state.metric), 400);
     if (!some.length) continue;
-    const all = known(rows, state.metric).map((row) => columns[state.metric][row]);
+    const all = known(rows, state.metric).map(ofMetric);
     const shared = { name: plain(groups[number]), hoverinfo: 'x+name' };
     traces.push({
       ...shared, type: 'violin', x: thinned(all, 4000), y0: number, orientation: 'h', side: 'positive', width: 1.15, points: false,
       fillcolor: fade(groupColour(number), 0.28), line: { color: groupColour(number), width: 1.4 }, spanmode: 'hard',
       box: { visible: true, width: 0.16, fillcolor: colour('--card'), line: { color: colour('--ink'), width: 1.1 } }, hoveron: 'violins',
     }, {
-      ...shared, mode: 'markers', x: some.map((row) => columns[state.metric][row]), customdata: some,
+      ...shared, mode: 'markers', x: some.map(ofMetric), customdata: some,
       y: some.map((row) => number - 0.12 - 0.24 * jitter(row)), marker: { size: 3.6, color: groupColour(number), opacity: 0.5 },
       hovertemplate: '%{x:.4~g}<extra>run %{text}</extra>', text: some.map((row) => columns.run[row]),
     });
@@ -101,7 +96,7 @@ function drawSweep() {
       const [value, run] = [columns[name][row], `${columns.run[row]}|${seedOf(row)}`];
       if (!byValue.has(value)) byValue.set(value, new Map());
       const byRun = byValue.get(value);
-      byRun.set(run, [...(byRun.get(run) ?? []), columns[state.metric][row]]);
+      byRun.set(run, [...(byRun.get(run) ?? []), ofMetric(row)]);
     }
     const values = [...byValue.keys()].sort((a, b) => (typeof a === 'number' ? a - b : 0));
     const samples = values.map((value) => [...byValue.get(value).values()].map(mean)); // points of a sweep share a run's draws
@@ -122,14 +117,14 @@ function drawPaired() {
   byId('paired-box').hidden = !drawn.is_paired;
   if (!drawn.is_paired) return;
   const key = (row) => [columns.run[row], seedOf(row), ...drawn.swept.map((name) => columns[name][row])].join('|');
-  const reference = new Map(rowsOf(state.reference).map((row) => [key(row), columns[state.metric][row]]));
+  const reference = new Map(rowsOf(state.reference).map((row) => [key(row), ofMetric(row)]));
   const traces = [];
   for (const [number, rows] of chosen) {
     if (number === state.reference) continue;
     const differences = [];
     for (const row of known(rows, state.metric)) {
       const other = reference.get(key(row));
-      if (other !== undefined && other !== null) differences.push(columns[state.metric][row] - other);
+      if (other !== undefined && other !== null) differences.push(ofMetric(row) - other);
     }
     if (!differences.length) continue;
     const half = drawn.swept.some((name) => !state.sweep[name]) ? null : halfInterval(differences);
@@ -156,30 +151,29 @@ function pipelineTrace() {
   };
 }
 
+/** A map from above, to scale. */
+function showMap(id, traces) {
+  show(id, [pipelineTrace(), ...traces], layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
+}
+
 const runsWithWay = [...new Set(ways.paths.map((way) => way.run))];
 const otherWays = 'suave-des report --paths N adds those of N runs';
 
 function sayWhichWays() {
   const n = runsWithWay.length;
-  byId('runs-title').textContent = n
-    ? `Each mission; click one to view it, with path and timeline of ${n} run${n > 1 ? 's' : ''} of each manager`
-    : `Each mission; click one to view it. ${ways.note}`;
-  byId('where-title').textContent = `Paths of ${n} run${n > 1 ? 's' : ''} of each manager, from above`;
+  const some = `${n} run${n > 1 ? 's' : ''} of each manager`;
+  byId('runs-title').textContent = `Each mission; click one to view it${n ? `, with path and timeline of ${some}` : `. ${ways.note}`}`;
+  byId('where-title').textContent = `Paths of ${some}, from above`;
 }
 
 function drawWhere() {
   byId('where-box').hidden = !ways.paths.length;
   if (!ways.paths.length) return;
-  const traces = [pipelineTrace()];
-  for (const way of ways.paths) {
-    if (!chosen.has(way.group)) continue;
-    traces.push({
-      mode: 'lines', x: way.x_m, y: way.y_m, name: `${plain(groups[way.group])}, run ${way.run}`, opacity: 0.6,
-      line: { color: groupColour(way.group), width: 1.3, dash: groupDash(way.group) }, hoverinfo: 'name',
-      customdata: way.x_m.map(() => [way.group, way.run]),
-    });
-  }
-  show('where', traces, layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
+  showMap('where', ways.paths.filter((way) => chosen.has(way.group)).map((way) => ({
+    mode: 'lines', x: way.x_m, y: way.y_m, name: `${plain(groups[way.group])}, run ${way.run}`, opacity: 0.6,
+    line: { color: groupColour(way.group), width: 1.3, dash: groupDash(way.group) }, hoverinfo: 'name',
+    customdata: way.x_m.map(() => [way.group, way.run]),
+  })));
   onClick('where', ([group, run] = []) => { if (run !== undefined) selectRun(run, group); });
 }
 
@@ -219,20 +213,19 @@ function selectRun(run, group) {
 
 function drawRun() {
   const rows = [];
-  for (let row = 0; row < COUNT; row++) if (columns.run[row] === state.run && chosen.has(columns.group[row])) rows.push(row);
+  columns.run.forEach((run, row) => { if (run === state.run && chosen.has(columns.group[row])) rows.push(row); });
   byId('run').hidden = state.run === null;
   if (state.run === null) return;
   byId('run-number').value = state.run;
   const shown = [...METRICS, ...drawn.swept];
   const body = rows.slice(0, 60).map((row) => {
     const number = columns.group[row];
-    const line = element('tr', {
+    return element('tr', {
       tabindex: '0', class: hasWay(number, state.run) ? 'has-way' : '', 'aria-selected': number === state.group,
       onclick: () => selectRun(state.run, number), onkeydown: (event) => { if (event.key === 'Enter') selectRun(state.run, number); },
     }, element('td', element('i', { style: `--own:${groupColour(number)}` }), groups[number]),
     shown.map((name) => element('td', columns[name][row] ?? '–')),
     element('td', columns.found[row] === null ? '–' : columns.found[row] ? 'found' : 'not found'));
-    return line;
   });
   byId('run-table').replaceChildren(element('table', element('thead', element('tr', element('th', 'manager'),
     shown.map((name) => element('th', titles[name] ?? name)), element('th', 'pipeline'))), element('tbody', body)));
@@ -302,12 +295,12 @@ function drawMapOf(way) {
   }
   const modeColour = modeColours();
   const colours = way.t_s.map((t) => modeColour(way.modes.findLast(([from]) => from <= t)?.[1] ?? ''));
-  show('run-map', [pipelineTrace(), {
+  showMap('run-map', [{
     mode: 'lines+markers', x: way.x_m, y: way.y_m, name: 'way', text: way.t_s, line: { color: colour('--faint'), width: 1 },
     marker: { size: 4, color: colours }, hovertemplate: '%{text:.0f} s<extra></extra>',
   }, {
     mode: 'markers', x: way.x_m.slice(0, 1), y: way.y_m.slice(0, 1), name: 'start', marker: { size: 10, color: colour('--ink') }, hoverinfo: 'name',
-  }], layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
+  }]);
 }
 
 // Text and tables.
@@ -345,7 +338,7 @@ const listed = (title, entries) => (Object.keys(entries).length ? element('detai
   Object.entries(entries).flatMap(([name, value]) => [element('dt', name), element('dd.mono', value)]))) : null);
 
 function makeTools() {
-  const chip = (number) => element('button', {
+  byId('managers').append(...groups.map((name, number) => element('button', {
     type: 'button', 'aria-pressed': 'true', style: `--own:var(--m${looks[number] % 6})`, onclick: (event) => {
       const button = event.currentTarget;
       if (state.hidden.has(number)) state.hidden.delete(number);
@@ -353,8 +346,7 @@ function makeTools() {
       button.setAttribute('aria-pressed', !state.hidden.has(number));
       refresh();
     },
-  }, element('i'), groups[number]);
-  byId('managers').append(...groups.map((_, number) => chip(number)));
+  }, element('i'), name)));
   const select = (place, entries, choose) => {
     place.append(...entries.map(([value, label]) => element('option', { value }, label)));
     place.onchange = () => { choose(place.value); refresh(); };

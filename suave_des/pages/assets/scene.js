@@ -32,10 +32,13 @@ for (let i = 1, length = 0; i < PIPELINE.length; i++) {
 }
 const PIPE_RADIUS = 0.14;
 
-function strokeLine(d, [x0, y0], [x1, y1]) {
+function tracePath(d, ...points) {
   d.beginPath();
-  d.moveTo(x0, y0);
-  d.lineTo(x1, y1);
+  for (const [x, y] of points) d.lineTo(x, y);
+}
+
+function strokeLine(d, from, to) {
+  tracePath(d, from, to);
   d.stroke();
 }
 
@@ -97,11 +100,7 @@ function drawWater({ d, camera, width, height, water, moment }) {
     const broad = width * (0.03 + 0.03 * hash(n, 3));
     const brightest = rgb([150, 230, 235], 0.13 + 0.05 * Math.sin(moment.t * 0.4 + n));
     d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, height * 0.8), [0, brightest], [1, rgb([150, 230, 235], 0)]);
-    d.beginPath();
-    d.moveTo(x, 0);
-    d.lineTo(x + broad, 0);
-    d.lineTo(x + broad * 2.6 + width * 0.1, height * 0.8);
-    d.lineTo(x + width * 0.06, height * 0.8);
+    tracePath(d, [x, 0], [x + broad, 0], [x + broad * 2.6 + width * 0.1, height * 0.8], [x + width * 0.06, height * 0.8]);
     d.fill();
   }
   d.globalCompositeOperation = 'source-over';
@@ -380,7 +379,8 @@ function drawSnow({ d, camera, view, moment, clarity }) {
 }
 
 function drawMurk({ d, width, height, water, clarity, camera, moment }) {
-  const at = camera.project(moment.pose.x, moment.pose.y, moment.pose.z) ?? [width / 2, height / 2];
+  const { pose } = moment;
+  const at = camera.project(pose.x, pose.y, pose.z) ?? [width / 2, height / 2];
   d.fillStyle = withStops(
     d.createRadialGradient(at[0], at[1], height * 0.12, at[0], at[1], Math.max(width, height) * 0.75),
     [0, rgb(water.far, 0.02 + 0.1 * (1 - clarity))],

@@ -15,13 +15,10 @@ function lengthAlong(x, y) {
 /** The whole mission from above. */
 function drawMap({ drawing: d, width, height }, play, moment) {
   d.clearRect(0, 0, width, height);
-  const { bounds, track } = play;
+  const { bounds: { x0, x1, y0, y1 }, track } = play;
   const margin = 11;
-  const scale = Math.min((width - 2 * margin) / (bounds.x1 - bounds.x0), (height - 2 * margin) / (bounds.y1 - bounds.y0));
-  const at = (x, y) => [
-    width / 2 + (x - (bounds.x0 + bounds.x1) / 2) * scale,
-    height / 2 - (y - (bounds.y0 + bounds.y1) / 2) * scale,
-  ];
+  const scale = Math.min((width - 2 * margin) / (x1 - x0), (height - 2 * margin) / (y1 - y0));
+  const at = (x, y) => [width / 2 + (x - (x0 + x1) / 2) * scale, height / 2 - (y - (y0 + y1) / 2) * scale];
   d.fillStyle = 'rgba(190,246,255,0.16)';
   d.beginPath();
   for (const { x, y, half, t } of play.swath) {
@@ -37,8 +34,8 @@ function drawMap({ drawing: d, width, height }, play, moment) {
     d.beginPath();
     for (const piece of PIECES) {
       if (seen && !isInspected(piece, moment)) continue;
-      d.moveTo(...at(piece.from[0], piece.from[1]));
-      d.lineTo(...at(piece.to[0], piece.to[1]));
+      d.moveTo(...at(...piece.from));
+      d.lineTo(...at(...piece.to));
     }
     d.stroke();
   }
@@ -54,10 +51,8 @@ function drawMap({ drawing: d, width, height }, play, moment) {
   d.lineWidth = 1;
   d.strokeRect(x - half, y - half, 2 * half, 2 * half);
   d.fillStyle = '#fff';
-  d.beginPath();
-  for (const [turn, far] of [[0, 6], [2.5, 4.6], [-2.5, 4.6]]) {
-    d.lineTo(x + far * Math.cos(pose.yaw + turn), y - far * Math.sin(pose.yaw + turn));
-  }
+  const corner = (turn, far) => [x + far * Math.cos(pose.yaw + turn), y - far * Math.sin(pose.yaw + turn)];
+  tracePath(d, corner(0, 6), corner(2.5, 4.6), corner(-2.5, 4.6));
   d.fill();
   d.font = '10px system-ui, sans-serif';
   d.fillStyle = '#eafaff';
@@ -84,8 +79,7 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   d.beginPath(); // where the water hides the sea bed
   d.moveTo(across(track.t_s[first]), 0);
   for (let i = first; i <= last; i++) {
-    const limit = track.visibility_m[i];
-    d.lineTo(across(track.t_s[i]), limit === null ? up(play.top) : up(limit));
+    d.lineTo(across(track.t_s[i]), up(track.visibility_m[i] ?? play.top));
   }
   d.lineTo(across(track.t_s[last]), 0);
   d.closePath();
@@ -113,10 +107,8 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   const deep = sees || visibility === null ? altitude : visibility;
   d.fillStyle = withStops(d.createLinearGradient(0, y, 0, up(altitude - deep) + 1),
     [0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)'], [1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)']);
-  d.beginPath();
-  d.moveTo(x, y);
-  d.lineTo(x - deep * TANGENT * metre, up(altitude - deep));
-  d.lineTo(x + deep * TANGENT * metre, up(altitude - deep));
+  const [half, foot] = [deep * TANGENT * metre, up(altitude - deep)];
+  tracePath(d, [x, y], [x - half, foot], [x + half, foot]);
   d.fill();
   d.fillStyle = sees ? '#fff3c0' : '#ff9c7a';
   d.fillRect(x - altitude * TANGENT * metre, floor - 1.5, 2 * altitude * TANGENT * metre, 3);
