@@ -7,7 +7,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from operator import attrgetter
 from pathlib import Path
 from textwrap import fill
@@ -375,15 +375,14 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     height = len(managers) * (0.34 * len(rows) + 0.3) + 0.9
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
-    keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
-        means = pandas.Series([_mean(runs[metric]) for runs in cells.values()], keys)
-        values = [mean.value for mean in means]
+        means = {key: _mean(runs[metric]) for key, runs in cells.items()}
+        values = [mean.value for mean in means.values()]
         ends = np.nanmin(values), np.nanmax(values)
         for axes, manager in zip(of_metric, managers, strict=True):
-            grid = means[manager].unstack(across, fill_value=Estimate())
-            grid = grid.reindex(index=rows, columns=columns, fill_value=Estimate())
-            image = _draw_grid(axes, grid.to_numpy(), METRICS[metric], ends)
+            grid = [means.get((manager, *place), Estimate()) for place in product(rows, columns)]
+            shaped = np.array(grid).reshape(len(rows), len(columns))
+            image = _draw_grid(axes, shaped, METRICS[metric], ends)
             axes.set_title(style.text(folded(manager)))
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         lowest = of_metric[-1]

@@ -527,25 +527,25 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
     columns = 2 if len(listed) > 6 and max(map(len, sentences)) <= _COLUMN_LETTERS else 1
     list_in = 0.17 * -(-len(sentences) // columns) + 0.1 if changes else 0.01
     level = battery_level(record)
-    heights = [1.9, *([0.7] if level is not None else []), 0.24 * len(lines) + 0.2, list_in]
+    battery_in = [] if level is None else [0.7]
+    heights = [1.9, *battery_in, 0.24 * len(lines) + 0.2, list_in]
     figure = style.Picture(figsize=(style.WIDTH_IN, sum(heights) + 0.9), layout="constrained")
-    panels = figure.subplots(len(heights), 1, height_ratios=heights)
-    for axes in panels[1:-1]:
-        axes.sharex(panels[0])
-    _draw_altitude(panels[0], record, listed)
-    if level is not None:
-        panels[1].plot(record.trajectory["t_s"], 100.0 * level, color=style.GREEN, lw=1.2)
-        panels[1].set(ylabel="battery (%)", ylim=(0, 105))
-    _draw_lines(panels[-2], lines)
-    for axes in panels[:-2]:
+    *upper, bars, below = figure.subplots(len(heights), 1, height_ratios=heights)
+    altitude, *battery = upper
+    _draw_altitude(altitude, record, listed)
+    for axes in battery:
+        axes.plot(record.trajectory["t_s"], 100.0 * level, color=style.GREEN, lw=1.2)
+        axes.set(ylabel="battery (%)", ylim=(0, 105))
+    _draw_lines(bars, lines)
+    for axes in upper:
         axes.tick_params(labelbottom=False)
-    panels[0].set_xlim(0.0, record.end_s)
-    panels[-2].set_xlabel("mission time (s)")
-    panels[0].set_title(style.text(record.name), pad=16)
-    for axes in panels[:-1]:
+    for axes in (*upper, bars):
+        axes.set_xlim(0.0, record.end_s)
         for each in changes:
             axes.axvline(each.t_s, color="#777777", lw=0.5, ls=":", zorder=1)
-    _draw_list(panels[-1], sentences, columns)
+    bars.set_xlabel("mission time (s)")
+    altitude.set_title(style.text(record.name), pad=16)
+    _draw_list(below, sentences, columns)
     return figure
 
 
