@@ -120,12 +120,13 @@ def campaign(
             result = run_campaign(
                 scenario, settings_of=partial(manager_options, manager_option), **settings
             )
-    _print_result(result)
-    exit_telling_failures(result)
+    _tell_result(result)
 
 
-def _print_result(result: CampaignResult) -> None:
-    """Print the summary of a campaign, how managers differ, and where its missions are."""
+def _tell_result(result: CampaignResult) -> None:
+    """Print the summary of a campaign, how managers differ, and where its missions are; exit if
+    some failed.
+    """
     console = output()
     print_table(console, _summary(result))
     sharing = result.campaign.variation.runs_sharing_draw
@@ -143,6 +144,7 @@ def _print_result(result: CampaignResult) -> None:
     if result.folder is not None:
         kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
         console.print(f"{kept} in {result.folder}/runs.csv")
+    exit_telling_failures(result)
 
 
 def _summary(result: CampaignResult) -> Table:
@@ -159,9 +161,8 @@ def _summary(result: CampaignResult) -> Table:
 
     parameters = result.campaign.variation.sweep.parameters
     rows = []
-    for cells in result.summary[
-        : _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1
-    ]:
+    shown = len(result.summary) if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1
+    for cells in result.summary[:shown]:
         swept = (
             f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name])
             for name in parameters
@@ -190,30 +191,15 @@ def _differences(found: Sequence[TableRow], parameters: Sequence[str]) -> Table:
         rows.append([METRICS[metric].brief])
         for each in group:
             same = f"{max(each['members_above_0'], each['members_below_0'])} of {each['members']}"
-            ranges = [
-                bounds(each[f"{name}_low"], each[f"{name}_high"]) for name in ("ci95", "range95")
-            ]
             swept = [str(each[name]) for name in parameters]
-            rows.append(
-                [
-                    *swept,
-                    f"  {each['first']} - {each['second']}",
-                    f"{each['difference']:+.2f}",
-                    *ranges,
-                    same,
-                ]
-            )
-    headings = [
-        *parameters,
-        "first - second",
-        "difference",
-        "by chance",
-        "over the sets",
-        "same sign",
-    ]
-    return Table(
-        headings, rows, "Differences, paired by run, with 95% ranges", f"{'r' * len(parameters)}l"
-    )
+            names = f"  {each['first']} - {each['second']}"
+            by_chance = bounds(each["ci95_low"], each["ci95_high"])
+            over_sets = bounds(each["range95_low"], each["range95_high"])
+            size = f"{each['difference']:+.2f}"
+            rows.append([*swept, names, size, by_chance, over_sets, same])
+    columns = ("first - second", "difference", "by chance", "over the sets", "same sign")
+    title = "Differences, paired by run, with 95% ranges"
+    return Table([*parameters, *columns], rows, title, f"{'r' * len(parameters)}l")
 
 
 def exit_telling_failures(result: CampaignResult) -> None:
@@ -357,11 +343,10 @@ def train(
     rows = []
     for first in range(0, missions, size):
         block = found[first : first + size]
-        means = (
-            fmean(each.search_time_s for each in block),
-            fmean(each.distance_inspected_m for each in block),
-        )
-        rows.append((f"{first + 1} to {first + len(block)}", *(f"{mean:.2f}" for mean in means)))
+        search_s = fmean(each.search_time_s for each in block)
+        inspected_m = fmean(each.distance_inspected_m for each in block)
+        numbers = f"{first + 1} to {first + len(block)}"
+        rows.append((numbers, f"{search_s:.2f}", f"{inspected_m:.2f}"))
     headings = ("missions", "search time, s", "distance, m")
     console = output()
     print_table(console, Table(headings, rows, f"{manager} on {scenario}, means"))
@@ -468,5 +453,4 @@ def _serve_clients(scenario: str, name: str, address: Given, options: Given) -> 
         print(f"ws://{address['host']}:{bridge.port}; Ctrl-C ends it", flush=True)
         settings = {"runs": 1, "time_out_s": _NEVER_S, "command": command_line(), **options}
         result = fly_campaign(bridge.outcomes, scenario, f"client:{name}", **settings)
-    _print_result(result)
-    exit_telling_failures(result)
+    _tell_result(result)

@@ -20,14 +20,12 @@ def scenarios() -> None:
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
-    files = sorted(folder.glob("*.yaml"))
-    campaigns = [path for path in files if path.stem.endswith("_campaign")]
-    modes = [path for path in files if path.stem.endswith("_modes")]
+    campaigns = sorted(folder.glob("*_campaign.yaml"))
+    modes = sorted(folder.glob("*_modes.yaml"))
     rows = []
-    for path in files:
-        if path not in (*campaigns, *modes):
-            scenario = load_scenario(path).scenario
-            rows.append((path.stem, scenario.revision.name, scenario.description))
+    for path in sorted({*folder.glob("*.yaml")} - {*campaigns, *modes}):
+        scenario = load_scenario(path).scenario
+        rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
     print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
@@ -69,13 +67,11 @@ def import_config(
     from suave_des.registry import manager_names
 
     targets = list(filter(None, (out, campaign)))
+    named = list(map(real, (*files, *targets)))
     for target in targets:
-        if list(map(real, (*files, *targets))).count(real(target)) > 1:
-            raise InputError(
-                "is one of the other files, too",
-                file=target,
-                remedy="give the output a different name",
-            )
+        if named.count(real(target)) > 1:
+            remedy = "give the output a different name"
+            raise InputError("is one of the other files, too", file=target, remedy=remedy)
         check_output_file(target, overwrite=overwrite)
     given = {"revision": revision, "campaign": campaign, "runner_seed": runner_seed}
     # tables from what is published of a manager are not the one that a configuration names

@@ -71,7 +71,7 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     labels = [*map(_label, groups), "markers on the axis: means"]
     rows = math.ceil(len(labels) / _legend_columns(labels))
     legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
+    figure = style.Picture(2.5 + legend_in)
     for axes, metric, title in _metric_panels(figure):
         ends = [_finite(group.frame[metric]).max() for group in groups]
         end = max(1.0, np.nanmax(ends) * 1.06)
@@ -143,7 +143,7 @@ def draw_differences(drawn: Groups) -> style.Picture:
             remedy="give campaigns of two managers or more with the same seed",
         )
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
-    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    figure = style.Picture(height)
     is_of_runs = drawn.counted in ("mission", "run")
     for axes, metric, title in _metric_panels(figure):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
@@ -319,7 +319,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     columns = len(parameters)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     height_in = 4.0 + 0.2 * math.ceil((frame["curve"].nunique() + 1) / 3)
-    figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
+    figure = style.Picture(height_in, width_in)
     panels = figure.subplots(len(PAPER_METRICS), columns, sharex="col", sharey="row", squeeze=False)
     counts: list[int] = []
     for row, metric in zip(panels, PAPER_METRICS, strict=True):
@@ -373,7 +373,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
         raise InputError(problem, place="parameters", remedy=remedy)
     height = len(managers) * (0.34 * len(rows) + 0.3) + 0.9
-    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    figure = style.Picture(height)
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
         means = {key: _mean(runs[metric]) for key, runs in cells.items()}

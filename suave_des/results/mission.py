@@ -259,7 +259,7 @@ def draw_map(record: MissionRecord) -> style.Picture:
     """Draw the map of a mission, with altitude, visibility and battery over time."""
     colours = mode_colours(record)
     marks = list(_marks(record))
-    figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
+    figure = style.Picture(5.2)
     panels = figure.subplot_mosaic("aa;bc", height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))
     whole = panels["a"]
     zoom = panels["b"]
@@ -529,7 +529,7 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
     level = battery_level(record)
     battery_in = [] if level is None else [0.7]
     heights = [1.9, *battery_in, 0.24 * len(lines) + 0.2, list_in]
-    figure = style.Picture(figsize=(style.WIDTH_IN, sum(heights) + 0.9), layout="constrained")
+    figure = style.Picture(sum(heights) + 0.9)
     *upper, bars, below = figure.subplots(len(heights), 1, height_ratios=heights)
     altitude, *battery = upper
     _draw_altitude(altitude, record, listed)

@@ -98,7 +98,10 @@ def text(name: str) -> str:
 
 
 class Picture(Figure):
-    """A figure that a notebook shows without further settings."""
+    """A figure that a notebook shows without further settings, by default as wide as a page."""
+
+    def __init__(self, height_in: float, width_in: float = WIDTH_IN) -> None:
+        super().__init__(figsize=(width_in, height_in), layout="constrained")
 
     def _repr_png_(self) -> bytes:
         picture = io.BytesIO()

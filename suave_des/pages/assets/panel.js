@@ -4,16 +4,12 @@ const HELD_S = 9; // after this the panel shows what happened last as something 
 const STATUS = /^(fg_status|o_status|o_updatable|fd_realisability|c_status|fd_error_log)\((.*)\)$/;
 
 function makePanel(play) {
-  const phase = (name, title) => {
+  const phases = Object.fromEntries(['Monitor', 'Analyze', 'Plan', 'Execute', 'Knowledge'].map((title) => {
     const time = element('time');
     const body = element('div');
-    const box = element(`section.phase.${name}`, element('h3', title, time), body);
-    return { box, body, time };
-  };
-  const phases = {
-    monitor: phase('monitor', 'Monitor'), analyze: phase('analyze', 'Analyze'), plan: phase('plan', 'Plan'),
-    execute: phase('execute', 'Execute'), knowledge: phase('knowledge', 'Knowledge'),
-  };
+    const name = title.toLowerCase();
+    return [name, { box: element(`section.phase.${name}`, element('h3', title, time), body), body, time }];
+  }));
   const { note } = play.mission.cycles;
   const box = element('aside.mind', { 'aria-label': `MAPE-K of ${play.manager}` },
     Object.values(phases).map((each) => each.box));
@@ -31,7 +27,7 @@ function makePanel(play) {
   function update(moment) {
     const { cycles } = play.mission.cycles;
     const place = lastAt(cycles, moment.t, (each) => each.t_s);
-    const cycle = place < 0 ? null : cycles[place];
+    const cycle = cycles[place];
     const event = play.happenings.slice(0, place + 1).findLast((each) => each);
     showMonitor(moment, cycle);
     if (!cycles.length) showWithout(moment);
@@ -39,7 +35,8 @@ function makePanel(play) {
     showExecute(moment);
     const age = (t = -Infinity) => moment.t - t;
     const done = play.requests[lastAt(play.requests, moment.t, (each) => each.t)];
-    phases.monitor.box.classList.toggle('active', age(cycle?.t_s) < 1 || age(lastTime(play.mission.thrusters, moment.t)) < 2);
+    const [reported] = play.mission.thrusters.findLast(([t]) => t <= moment.t + 1e-6) ?? [];
+    phases.monitor.box.classList.toggle('active', age(cycle?.t_s) < 1 || age(reported) < 2);
     phases.analyze.box.classList.toggle('active', age(event?.t_s) < 2.5 && event.inferred >= 0);
     phases.plan.box.classList.toggle('active', age(event?.t_s) < 3);
     phases.execute.box.classList.toggle('active', age(done?.t) < 2);
@@ -151,7 +148,7 @@ function makePanel(play) {
 
   function showWithout(moment) {
     const own = play.mission.events.filter(([, source]) => source === play.manager);
-    const until = lastAt(own, moment.t, (each) => each[0]);
+    const until = lastAt(own, moment.t, ([t]) => t);
     once('analyze', `own${until}`, () => (own.length
       ? own.slice(Math.max(0, until - (own[until]?.[2] === 'tick' ? 0 : 3)), until + 1).map(showOwn)
       : element('p.quiet', `${play.manager} records no knowledge: its decisions are made in code`)));
@@ -182,25 +179,14 @@ function makePanel(play) {
   function showExecute(moment) {
     const until = lastAt(play.requests, moment.t, (each) => each.t);
     const recent = play.requests.slice(Math.max(0, until - 2), until + 1).reverse();
-    const key = recent.map((each) => [each.t, each.set !== null && each.set <= moment.t]).join();
-    once('execute', key || 'none', () => (recent.length ? recent.map((each) => {
-      const isSet = each.set !== null && each.set <= moment.t;
-      return element('p', element('code', `${each.function} → ${each.mode}`), ' ',
-        element('span.quiet', `${each.t.toFixed(1)} s${isSet ? `, in effect ${each.set.toFixed(1)} s` : ', under way'}`));
-    }) : element('p.quiet', 'no mode requested yet')));
+    const key = recent.map((each) => [each.t, each.set <= moment.t]).join();
+    once('execute', key, () => (recent.length ? recent.map(({ t, change, set }) => element('p', element('code', change), ' ',
+      element('span.quiet', `${t.toFixed(1)} s, ${set <= moment.t ? `in effect ${set.toFixed(1)} s` : 'under way'}`)))
+      : element('p.quiet', 'no mode requested yet')));
   }
 
   return { box, update };
 }
 
 /** Index of the last entry at or before a time, -1 if there is none. */
-function lastAt(entries, t, timeOf) {
-  let [low, high] = [0, entries.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (timeOf(entries[middle]) <= t + 1e-6) low = middle + 1;
-    else high = middle;
-  }
-  return low - 1;
-}
-const lastTime = (entries, t) => entries[lastAt(entries, t, (each) => each[0])]?.[0];
+const lastAt = (entries, t, timeOf) => entries.findLastIndex((each) => timeOf(each) <= t + 1e-6);

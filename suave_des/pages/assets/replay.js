@@ -44,12 +44,10 @@ function prepare(mission) {
   });
   play.requests = [];
   for (const [t, , event, detail] of mission.events) {
-    if (event === 'mode_requested') {
-      const [name, mode] = detail.split(' -> ');
-      play.requests.push({ t, function: name, mode, set: null });
-    } else if (event === 'mode_set') {
-      const [name, mode] = detail.split(' = ');
-      const open = play.requests.findLast((each) => each.function === name && each.mode === mode && each.set === null);
+    if (event === 'mode_requested') play.requests.push({ t, change: detail.replace(' -> ', ' → '), set: Infinity });
+    if (event === 'mode_set') {
+      const change = detail.replace(' = ', ' → ');
+      const open = play.requests.findLast((each) => each.change === change && each.set === Infinity);
       if (open) open.set = t;
     }
   }

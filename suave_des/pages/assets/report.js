@@ -2,7 +2,7 @@
 
 const { results, ways, made } = DATA;
 const { drawn } = results;
-const { columns, groups, titles } = drawn;
+const { columns, titles } = drawn;
 const METRICS = Object.keys(titles);
 const state = { hidden: new Set(), metric: METRICS[0], found: 'all', sweep: {}, reference: 0, run: null, group: null };
 const seedOf = (row) => columns.seed[columns.seed.length === 1 ? 0 : row];
@@ -34,11 +34,12 @@ function refresh() {
 function drawDistribution() {
   const traces = [];
   for (const [number, rows] of chosen) {
+    const { name, color, dash } = lookOf(number);
     const values = known(rows, state.metric).map(ofMetric);
     if (!values.length) continue;
     traces.push({
-      ...distribution(values), mode: 'lines', name: plain(groups[number]),
-      line: { color: groupColour(number), width: 2.2, shape: 'hv', dash: groupDash(number) },
+      ...distribution(values), mode: 'lines', name,
+      line: { color, width: 2.2, shape: 'hv', dash },
       hovertemplate: '%{y:.1%} at or below %{x:.4~g}<extra>%{fullData.name}</extra>',
     });
   }
@@ -51,17 +52,18 @@ function drawDistribution() {
 function drawSpread() {
   const traces = [];
   for (const [number, rows] of chosen) {
+    const { name, color } = lookOf(number);
     const some = thinned(known(rows, state.metric), 400);
     if (!some.length) continue;
     const all = known(rows, state.metric).map(ofMetric);
-    const shared = { name: plain(groups[number]), hoverinfo: 'x+name' };
+    const shared = { name, hoverinfo: 'x+name' };
     traces.push({
       ...shared, type: 'violin', x: thinned(all, 4000), y0: number, orientation: 'h', side: 'positive', width: 1.15, points: false,
-      fillcolor: fade(groupColour(number), 0.28), line: { color: groupColour(number), width: 1.4 }, spanmode: 'hard',
+      fillcolor: fade(color, 0.28), line: { color, width: 1.4 }, spanmode: 'hard',
       box: { visible: true, width: 0.16, fillcolor: colour('--card'), line: { color: colour('--ink'), width: 1.1 } }, hoveron: 'violins',
     }, {
       ...shared, mode: 'markers', x: some.map(ofMetric), customdata: some,
-      y: some.map((row) => number - 0.12 - 0.24 * jitter(row)), marker: { size: 3.6, color: groupColour(number), opacity: 0.5 },
+      y: some.map((row) => number - 0.12 - 0.24 * jitter(row)), marker: { size: 3.6, color, opacity: 0.5 },
       hovertemplate: '%{x:.4~g}<extra>run %{text}</extra>', text: some.map((row) => columns.run[row]),
     });
     traces.push({
@@ -91,6 +93,7 @@ function drawSweep() {
   if (!name) return;
   const traces = [];
   for (const [number, rows] of chosen) {
+    const { name, color, dash, symbol } = lookOf(number);
     const byValue = new Map();
     for (const row of known(rows, state.metric)) {
       const [value, run] = [columns[name][row], `${columns.run[row]}|${seedOf(row)}`];
@@ -101,11 +104,11 @@ function drawSweep() {
     const values = [...byValue.keys()].sort((a, b) => (typeof a === 'number' ? a - b : 0));
     const samples = values.map((value) => [...byValue.get(value).values()].map(mean)); // points of a sweep share a run's draws
     traces.push({
-      mode: 'lines+markers', name: plain(groups[number]), x: values, y: samples.map(mean),
-      error_y: { type: 'data', array: samples.map(halfInterval), color: groupColour(number), thickness: 1.3, width: 4 },
+      mode: 'lines+markers', name, x: values, y: samples.map(mean),
+      error_y: { type: 'data', array: samples.map(halfInterval), color, thickness: 1.3, width: 4 },
       text: samples.map((sample) => `± ${halfInterval(sample)?.toFixed(2) ?? '?'}, ${sample.length} runs`),
-      line: { color: groupColour(number), width: 2, dash: groupDash(number) },
-      hovertemplate: '%{y:.2f} %{text} at %{x}<extra>%{fullData.name}</extra>', marker: { symbol: groupSymbol(number), size: 7 },
+      line: { color, width: 2, dash },
+      hovertemplate: '%{y:.2f} %{text} at %{x}<extra>%{fullData.name}</extra>', marker: { symbol, size: 7 },
     });
   }
   const others = drawn.swept.filter((each) => each !== name && !state.sweep[each]);
@@ -120,6 +123,7 @@ function drawPaired() {
   const reference = new Map(rowsOf(state.reference).map((row) => [key(row), ofMetric(row)]));
   const traces = [];
   for (const [number, rows] of chosen) {
+    const { name, color } = lookOf(number);
     if (number === state.reference) continue;
     const differences = [];
     for (const row of known(rows, state.metric)) {
@@ -129,13 +133,13 @@ function drawPaired() {
     if (!differences.length) continue;
     const half = drawn.swept.some((name) => !state.sweep[name]) ? null : halfInterval(differences);
     traces.push({
-      type: 'histogram', x: differences, name: plain(groups[number]), opacity: 0.62, nbinsx: 45, histnorm: 'percent',
-      marker: { color: groupColour(number), line: { color: colour('--card'), width: 0.6 } },
+      type: 'histogram', x: differences, name, opacity: 0.62, nbinsx: 45, histnorm: 'percent',
+      marker: { color, line: { color: colour('--card'), width: 0.6 } },
       hovertemplate: `%{y:.1f}% of ${differences.length.toLocaleString('en')} pairs<br>differ by %{x}<extra>%{fullData.name}</extra>`,
     }, {
-      mode: 'markers', x: [mean(differences)], y: [0], name: plain(groups[number]), cliponaxis: false,
+      mode: 'markers', x: [mean(differences)], y: [0], name, cliponaxis: false,
       error_x: { type: 'data', array: [half], color: colour('--ink') },
-      marker: { symbol: 'triangle-up', size: 12, color: groupColour(number), line: { color: colour('--card'), width: 1 } },
+      marker: { symbol: 'triangle-up', size: 12, color, line: { color: colour('--card'), width: 1 } },
       hovertemplate: `mean difference %{x:.2f}${half === null ? '' : ` ± ${half.toFixed(2)}`}<extra>%{fullData.name}</extra>`,
     });
   }
@@ -169,11 +173,13 @@ function sayWhichWays() {
 function drawWhere() {
   byId('where-box').hidden = !ways.paths.length;
   if (!ways.paths.length) return;
-  showMap('where', ways.paths.filter((way) => chosen.has(way.group)).map((way) => ({
-    mode: 'lines', x: way.x_m, y: way.y_m, name: `${plain(groups[way.group])}, run ${way.run}`, opacity: 0.6,
-    line: { color: groupColour(way.group), width: 1.3, dash: groupDash(way.group) }, hoverinfo: 'name',
-    customdata: way.x_m.map(() => [way.group, way.run]),
-  })));
+  showMap('where', ways.paths.filter((way) => chosen.has(way.group)).map(({ group, run, x_m: x, y_m: y }) => {
+    const { name, color, dash } = lookOf(group);
+    return {
+      mode: 'lines', x, y, name: `${name}, run ${run}`, opacity: 0.6, line: { color, width: 1.3, dash }, hoverinfo: 'name',
+      customdata: x.map(() => [group, run]),
+    };
+  }));
   onClick('where', ([group, run] = []) => { if (run !== undefined) selectRun(run, group); });
 }
 
@@ -184,12 +190,13 @@ function drawRuns() {
   const [x, y] = METRICS.includes('distance_inspected_m') ? ['search_time_s', 'distance_inspected_m'] : ['search_time_s', METRICS.at(-1)];
   const other = state.metric === x ? y : state.metric;
   for (const [number, rows] of chosen) {
+    const { name, color, symbol } = lookOf(number);
     const some = thinned(rows.filter((row) => columns[x][row] !== null && columns[other][row] !== null), 1200);
     traces.push({
-      mode: 'markers', name: plain(groups[number]), x: some.map((row) => columns[x][row]), y: some.map((row) => columns[other][row]),
+      mode: 'markers', name, x: some.map((row) => columns[x][row]), y: some.map((row) => columns[other][row]),
       customdata: some, text: some.map((row) => columns.run[row]),
       marker: {
-        color: groupColour(number), symbol: groupSymbol(number), opacity: some.length > 300 ? 0.45 : 0.7,
+        color, symbol, opacity: some.length > 300 ? 0.45 : 0.7,
         size: some.map((row) => (columns.run[row] === state.run ? 15 : 6)),
         line: { width: some.map((row) => (columns.run[row] === state.run ? 2.2 : hasWay(number, columns.run[row]) ? 1.4 : 0)), color: colour('--ink') },
       },
@@ -223,7 +230,7 @@ function drawRun() {
     return element('tr', {
       tabindex: '0', class: hasWay(number, state.run) ? 'has-way' : '', 'aria-selected': number === state.group,
       onclick: () => selectRun(state.run, number), onkeydown: (event) => { if (event.key === 'Enter') selectRun(state.run, number); },
-    }, element('td', element('i', { style: `--own:${groupColour(number)}` }), groups[number]),
+    }, element('td', element('i', { style: `--own:var(${tintOf(number)})` }), groups[number]),
     shown.map((name) => element('td', columns[name][row] ?? '–')),
     element('td', columns.found[row] === null ? '–' : columns.found[row] ? 'found' : 'not found'));
   });
@@ -255,7 +262,7 @@ function drawTimeOf(way) {
   }
   const modeColour = modeColours();
   const traces = [{
-    mode: 'lines', x: way.t_s, y: way.visibility_m, name: 'visibility', fill: 'tozeroy', fillcolor: fade(groupColour(0), 0.08),
+    mode: 'lines', x: way.t_s, y: way.visibility_m, name: 'visibility', fill: 'tozeroy', fillcolor: fade(lookOf(0).color, 0.08),
     line: { color: colour('--faint'), width: 1.2, dash: 'dot' }, hovertemplate: '%{y:.2f} m at %{x:.0f} s<extra>visibility</extra>',
   }];
   way.modes.forEach(([from, mode], place) => {
@@ -310,7 +317,7 @@ function tableOf(headings, rows) {
     headings.map((each) => element('th', each)))), element('tbody', rows.map((cells) => {
     const number = groups.indexOf(cells[0]);
     return element('tr', cells.map((cell, place) => element('td',
-      place === 0 && number >= 0 ? element('i.swatch', { 'data-group': number }) : null, cell)));
+      place === 0 && number >= 0 ? element('i', { style: `--own:var(${tintOf(number)})` }) : null, cell)));
   }))));
 }
 
@@ -339,7 +346,7 @@ const listed = (title, entries) => (Object.keys(entries).length ? element('detai
 
 function makeTools() {
   byId('managers').append(...groups.map((name, number) => element('button', {
-    type: 'button', 'aria-pressed': 'true', style: `--own:var(--m${looks[number] % 6})`, onclick: (event) => {
+    type: 'button', 'aria-pressed': 'true', style: `--own:var(${tintOf(number)})`, onclick: (event) => {
       const button = event.currentTarget;
       if (state.hidden.has(number)) state.hidden.delete(number);
       else if (shownGroups().length > 1) state.hidden.add(number);
@@ -364,10 +371,6 @@ function makeTools() {
   byId('run-number').onchange = (event) => selectRun(Number(event.target.value));
 }
 
-function colourSwatches() {
-  document.querySelectorAll('.swatch').forEach((each) => each.style.setProperty('--own', groupColour(Number(each.dataset.group))));
-}
-
 /** The run with a way that comes nearest to the last manager's median. */
 function firstShown() {
   const group = groups.map((_, number) => number).findLast((number) => ways.paths.some((way) => way.group === number));
@@ -388,11 +391,10 @@ async function start() {
   await startPlotly();
   await new Promise(requestAnimationFrame); // the text is read while the charts are drawn
   refresh();
-  colourSwatches();
   const alone = [...document.querySelectorAll('#charts > figure:not(.wide)')].filter((each) => !each.hidden);
   if (alone.length % 2) alone.at(-1).classList.add('alone');
   dispatchEvent(new Event('resize')); // the charts take their boxes' new width
-  themeListeners.push(() => { refresh(); colourSwatches(); });
+  themeListeners.push(refresh);
   addEventListener('beforeprint', () => setTheme('light'));
   document.body.dataset.ready = 'true';
 }
