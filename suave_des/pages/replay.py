@@ -7,6 +7,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -208,14 +209,13 @@ def _inspected(
     """
     follow = mission.settings.revision.follow
     follows = [False, *(mode != UNGROUND_MODE for _, mode in modes)]
-    mode_times = [t_s for t_s, _ in modes]
     lengths_m = np.cumsum(way[:, 2]).tolist()
     next_point = 0
     was_following = False
     start_m = 0.0
     places = mission.trajectory[["t_s", "x_m", "y_m"]].to_numpy()
     for t_s, *place in places.tolist() if len(way) else ():
-        is_following = follows[bisect_right(mode_times, t_s)]
+        is_following = follows[bisect_right(modes, t_s, key=itemgetter(0))]
         if is_following and not was_following:
             next_point = 0 if follow.restarts_on_activation else next_point
             start_m = lengths_m[min(next_point, len(way) - 1)]

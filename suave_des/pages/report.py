@@ -279,7 +279,7 @@ def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, obj
     some = points[:: max(1, round(_PERIOD_S / period_s))]
     places = [(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some]
     x_m, y_m, altitude_m = np.round(places, 2).T.tolist()
-    seen_m = [each.visibility_m for each in some]
+    seen_m = map(attrgetter("visibility_m"), some)
     return {
         "t_s": [round(each.t_s, 1) for each in some],
         "x_m": x_m,

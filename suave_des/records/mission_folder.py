@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import astuple, dataclass, field, fields, replace
@@ -222,6 +222,12 @@ def _check_listed(folder: Path, mission: contents.MissionFile) -> None:
             raise InputError(problem, file=path, remedy="run the mission again")
 
 
+def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:
+    for name in needed:
+        if name not in found:
+            raise InputError(f"{name} is missing", file=path, remedy=_REMEDY)
+
+
 def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
     """Read a table that must have some columns: source, event, detail and mode are text, all others
     numbers, of which those that were not measured may be missing; times do not decrease.
@@ -231,9 +237,7 @@ def _read_table(path: Path, columns: Iterable[str]) -> pandas.DataFrame:
     texts = ("source", "event", "detail", "mode")
     header, rows, _ = read_csv(path, LIMIT_BYTES, _REMEDY)
     numbered = list(rows)
-    for name in columns:
-        if name not in header:
-            raise InputError(f"{name} is missing", file=path, remedy=_REMEDY)
+    _check_columns(path, columns, header)
     for line, row in numbered:
         if len(row) != len(header):
             problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"

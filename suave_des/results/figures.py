@@ -335,7 +335,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     _legend(figure, handles, labels, 3 if columns > 1 else 2)
     others = [name for name in missions.swept if name not in parameters]
     below = _averaged(frame, counts, others)
-    if columns > 1 and not others:
+    if len(missions.swept) == columns > 1:
         below += ", each averaged over the parameters of the other panels"
     _write_below(figure, below)
     return figure
@@ -377,7 +377,7 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
         means = {key: _mean(runs[metric]) for key, runs in cells.items()}
-        values = [mean.value for mean in means.values()]
+        values = list(map(attrgetter("value"), means.values()))
         ends = np.nanmin(values), np.nanmax(values)
         for axes, manager in zip(of_metric, managers, strict=True):
             grid = [means.get((manager, *place), Estimate()) for place in product(rows, columns)]

@@ -526,15 +526,15 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
     sentences = _sentences(changes, rules)
     columns = 2 if len(listed) > 6 and max(map(len, sentences)) <= _COLUMN_LETTERS else 1
     list_in = 0.17 * -(-len(sentences) // columns) + 0.1 if changes else 0.01
-    level = battery_level(record)
-    battery_in = [] if level is None else [0.7]
+    battery_in = [] if battery_level(record) is None else [0.7]
     heights = [1.9, *battery_in, 0.24 * len(lines) + 0.2, list_in]
     figure = style.Picture(sum(heights) + 0.9)
     *upper, bars, below = figure.subplots(len(heights), 1, height_ratios=heights)
     altitude, *battery = upper
     _draw_altitude(altitude, record, listed)
     for axes in battery:
-        axes.plot(record.trajectory["t_s"], 100.0 * level, color=style.GREEN, lw=1.2)
+        way = record.trajectory
+        axes.plot(way["t_s"], 100.0 * way["battery_level"], color=style.GREEN, lw=1.2)
         axes.set(ylabel="battery (%)", ylim=(0, 105))
     _draw_lines(bars, lines)
     for axes in upper:
