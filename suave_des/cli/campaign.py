@@ -29,11 +29,14 @@ from suave_des.cli.options import (
     Seed,
     Trusted,
     any_scenario,
+    argument,
     check_no_use,
     command_line,
     complete_managers,
+    flag,
     flags,
     manager_options,
+    option,
 )
 from suave_des.errors import InputError, number_of
 from suave_des.files import FAMILIES, check_beside, write_beside
@@ -71,14 +74,12 @@ def campaign(
     ],
     resume: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="Continue the campaign in this folder; --runs may add runs."
-        ),
+        option("Continue the campaign in this folder; --runs may add runs.", "DIR"),
     ] = None,
     yes: Trusted = False,
     form: Annotated[
         Literal["suave"] | None,
-        typer.Option("--format", help="Also write the exemplar's own files into DIR/suave."),
+        option("Also write the exemplar's own files into DIR/suave.", None, "--format"),
     ] = None,
     manager_option: ManagerOptions = None,
     quiet: Quiet = False,
@@ -119,12 +120,13 @@ def campaign(
             result = run_campaign(
                 scenario, settings_of=partial(manager_options, manager_option), **settings
             )
-    _print_result(result)
-    exit_telling_failures(result)
+    _tell_result(result)
 
 
-def _print_result(result: CampaignResult) -> None:
-    """Print the summary of a campaign, how managers differ, and where its missions are."""
+def _tell_result(result: CampaignResult) -> None:
+    """Print the summary of a campaign, how managers differ, and where its missions are; exit if
+    some failed.
+    """
     console = output()
     print_table(console, _summary(result))
     sharing = result.campaign.variation.runs_sharing_draw
@@ -142,6 +144,7 @@ def _print_result(result: CampaignResult) -> None:
     if result.folder is not None:
         kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
         console.print(f"{kept} in {result.folder}/runs.csv")
+    exit_telling_failures(result)
 
 
 def _summary(result: CampaignResult) -> Table:
@@ -158,9 +161,8 @@ def _summary(result: CampaignResult) -> Table:
 
     parameters = result.campaign.variation.sweep.parameters
     rows = []
-    for cells in result.summary[
-        : _ROWS_SHOWN if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1
-    ]:
+    shown = len(result.summary) if len(result.summary) <= _ROWS_SHOWN else _ROWS_SHOWN - 1
+    for cells in result.summary[:shown]:
         swept = (
             f"{cells[name]:.6g}" if isinstance(cells[name], float) else str(cells[name])
             for name in parameters
@@ -189,30 +191,15 @@ def _differences(found: Sequence[TableRow], parameters: Sequence[str]) -> Table:
         rows.append([METRICS[metric].brief])
         for each in group:
             same = f"{max(each['members_above_0'], each['members_below_0'])} of {each['members']}"
-            ranges = [
-                bounds(each[f"{name}_low"], each[f"{name}_high"]) for name in ("ci95", "range95")
-            ]
             swept = [str(each[name]) for name in parameters]
-            rows.append(
-                [
-                    *swept,
-                    f"  {each['first']} - {each['second']}",
-                    f"{each['difference']:+.2f}",
-                    *ranges,
-                    same,
-                ]
-            )
-    headings = [
-        *parameters,
-        "first - second",
-        "difference",
-        "by chance",
-        "over the sets",
-        "same sign",
-    ]
-    return Table(
-        headings, rows, "Differences, paired by run, with 95% ranges", f"{'r' * len(parameters)}l"
-    )
+            names = f"  {each['first']} - {each['second']}"
+            by_chance = bounds(each["ci95_low"], each["ci95_high"])
+            over_sets = bounds(each["range95_low"], each["range95_high"])
+            size = f"{each['difference']:+.2f}"
+            rows.append([*swept, names, size, by_chance, over_sets, same])
+    columns = ("first - second", "difference", "by chance", "over the sets", "same sign")
+    title = "Differences, paired by run, with 95% ranges"
+    return Table([*parameters, *columns], rows, title, f"{'r' * len(parameters)}l")
 
 
 def exit_telling_failures(result: CampaignResult) -> None:
@@ -301,13 +288,9 @@ def run(
     ],
     manager: Annotated[
         str,
-        typer.Option(
-            metavar="NAME",
-            help="A manager's name, or module:Class.",
-            autocompletion=complete_managers,
-        ),
+        option("A manager's name, or module:Class.", "NAME", autocompletion=complete_managers),
     ] = "metacontrol",
-    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run number.")] = 1,
+    run_number: Annotated[int, option("Run number.", "K", "--run")] = 1,
     manager_option: ManagerOptions = None,
     files: Files,
 ) -> None:
@@ -328,13 +311,11 @@ def run(
 
 
 def train(
-    manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option(help="Number of training missions.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
-    scenario: Annotated[
-        str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")
-    ] = DEFAULT_SCENARIO,
-    seed: Annotated[int, typer.Option(help="Training seed.")] = 0,
+    manager: Annotated[str, argument("The manager.", "MODULE:CLASS")],
+    missions: Annotated[int, option("Number of training missions.")],
+    out: Annotated[Path, option("File for the training result.", "FILE")],
+    scenario: Annotated[str, option("Scenario to train on.", "SCENARIO")] = DEFAULT_SCENARIO,
+    seed: Annotated[int, option("Training seed.")] = 0,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
     *,
@@ -362,11 +343,10 @@ def train(
     rows = []
     for first in range(0, missions, size):
         block = found[first : first + size]
-        means = (
-            fmean(each.search_time_s for each in block),
-            fmean(each.distance_inspected_m for each in block),
-        )
-        rows.append((f"{first + 1} to {first + len(block)}", *(f"{mean:.2f}" for mean in means)))
+        search_s = fmean(each.search_time_s for each in block)
+        inspected_m = fmean(each.distance_inspected_m for each in block)
+        numbers = f"{first + 1} to {first + len(block)}"
+        rows.append((numbers, f"{search_s:.2f}", f"{inspected_m:.2f}"))
     headings = ("missions", "search time, s", "distance, m")
     console = output()
     print_table(console, Table(headings, rows, f"{manager} on {scenario}, means"))
@@ -377,25 +357,25 @@ def train(
 class _Served:
     """Options of a server; a field is named as its option."""
 
-    host: Annotated[str, typer.Option(help="Address.")] = "127.0.0.1"
+    host: Annotated[str, option("Address.")] = "127.0.0.1"
     port: Annotated[
         int | None,
-        typer.Option(
+        option(
+            "Port; 0 for any free one.",
             min=0,
             max=65535,
-            help="Port; 0 for any free one.",
             show_default="3000; with --rosbridge 9090",
         ),
     ] = None
     host_name: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="A further name by which clients may call this machine."),
+        option("A further name by which clients may call this machine.", "NAME"),
     ] = None
     real_time_factor: Annotated[
         float | None,
-        typer.Option(
-            metavar="X",
-            help="Mission seconds per second; 0: advance only on request.",
+        option(
+            "Mission seconds per second; 0: advance only on request.",
+            "X",
             show_default="0; with --rosbridge 1",
         ),
     ] = None
@@ -423,19 +403,15 @@ def serve(
     ],
     rosbridge: Annotated[
         bool,
-        typer.Option(
-            "--rosbridge", help="Serve SUAVE's topics and services by the rosbridge protocol."
-        ),
+        flag("--rosbridge", "Serve SUAVE's topics and services by the rosbridge protocol."),
     ] = False,
     name: Annotated[
         str | None,
-        typer.Option(
-            help="The client's name in results, client:NAME; with --rosbridge.", show_default="ros"
-        ),
+        option("The client's name in results, client:NAME; with --rosbridge.", show_default="ros"),
     ] = None,
     run_number: Annotated[
         int | None,
-        typer.Option("--run", metavar="K", help="Run of the first mission.", show_default="1"),
+        option("Run of the first mission.", "K", "--run", show_default="1"),
     ] = None,
     seed: Seed = 1,
     served: _Served,
@@ -477,5 +453,4 @@ def _serve_clients(scenario: str, name: str, address: Given, options: Given) -> 
         print(f"ws://{address['host']}:{bridge.port}; Ctrl-C ends it", flush=True)
         settings = {"runs": 1, "time_out_s": _NEVER_S, "command": command_line(), **options}
         result = fly_campaign(bridge.outcomes, scenario, f"client:{name}", **settings)
-    _print_result(result)
-    exit_telling_failures(result)
+    _tell_result(result)

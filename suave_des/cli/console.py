@@ -119,17 +119,13 @@ def _metrics_rows(
 ) -> Iterator[tuple[str, str, str]]:
     """Name, value with its unit, and a remark on it."""
     reaction_s = metrics.mean_reaction_time_s
-    no_reaction = ("none", "no reaction was completed")
-    yield (
-        "search time",
-        f"{metrics.search_time_s:.1f} s",
-        "" if metrics.pipeline_found else _NOT_FOUND,
-    )
+    remark = "" if metrics.pipeline_found else _NOT_FOUND
+    yield "search time", f"{metrics.search_time_s:.1f} s", remark
     yield "distance inspected", f"{metrics.distance_inspected_m:.2f} m", ""
-    yield (
-        "mean reaction time",
-        *(no_reaction if reaction_s is None else (f"{reaction_s:.2f} s", "")),
-    )
+    if reaction_s is None:
+        yield "mean reaction time", "none", "no reaction was completed"
+    else:
+        yield "mean reaction time", f"{reaction_s:.2f} s", ""
     yield "adaptations", str(metrics.adaptations), ""
     yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():

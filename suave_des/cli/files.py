@@ -7,10 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from suave_des.cli.console import output, plain, print_table
-from suave_des.cli.options import Overwrite, any_scenario
+from suave_des.cli.options import Overwrite, any_scenario, argument, option
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, make_output_folder, real, write_files
 from suave_des.resources import shipped_folder
@@ -23,14 +21,12 @@ def scenarios() -> None:
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
-    files = sorted(folder.glob("*.yaml"))
-    campaigns = [path for path in files if path.stem.endswith("_campaign")]
-    modes = [path for path in files if path.stem.endswith("_modes")]
+    campaigns = sorted(folder.glob("*_campaign.yaml"))
+    modes = sorted(folder.glob("*_modes.yaml"))
     rows = []
-    for path in files:
-        if path not in (*campaigns, *modes):
-            scenario = load_scenario(path).scenario
-            rows.append((path.stem, scenario.revision.name, scenario.description))
+    for path in sorted({*folder.glob("*.yaml")} - {*campaigns, *modes}):
+        scenario = load_scenario(path).scenario
+        rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
     print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
@@ -52,21 +48,15 @@ def schema() -> None:
 
 
 def import_config(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="The exemplar's files, in any order.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
-    campaign: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Campaign file to write.")
-    ] = None,
+    files: Annotated[list[Path], argument("The exemplar's files, in any order.", "FILE...")],
+    out: Annotated[Path, option("Scenario file to write.", "FILE")],
+    campaign: Annotated[Path | None, option("Campaign file to write.", "FILE")] = None,
     revision: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Revision of the files, if they fit several.")
+        str | None, option("Revision of the files, if they fit several.", "NAME")
     ] = None,
     runner_seed: Annotated[
         int | None,
-        typer.Option(
-            metavar="SEED", help="Write the values that the exemplar's runner draws from this seed."
-        ),
+        option("Write the values that the exemplar's runner draws from this seed.", "SEED"),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -79,13 +69,11 @@ def import_config(
     from suave_des.registry import manager_names
 
     targets = list(filter(None, (out, campaign)))
+    named = list(map(real, (*files, *targets)))
     for target in targets:
-        if list(map(real, (*files, *targets))).count(real(target)) > 1:
-            raise InputError(
-                "is one of the other files, too",
-                file=target,
-                remedy="give the output a different name",
-            )
+        if named.count(real(target)) > 1:
+            remedy = "give the output a different name"
+            raise InputError("is one of the other files, too", file=target, remedy=remedy)
         check_output_file(target, overwrite=overwrite)
     given = {"revision": revision, "campaign": campaign, "runner_seed": runner_seed}
     # tables from what is published of a manager are not the one that a configuration names
@@ -106,13 +94,11 @@ def export_config(
     scenario: Annotated[str, any_scenario(False)],
     out: Annotated[
         Path,
-        typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml."),
+        option("Folder for mission_config.yaml and runner_config.yml.", "DIR"),
     ],
     revision: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME", help="Revision that is to read them.", show_default="the scenario's"
-        ),
+        option("Revision that is to read them.", "NAME", show_default="the scenario's"),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -141,12 +127,10 @@ def export_config(
 
 
 def tree(
-    manager: Annotated[
-        str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")
-    ],
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO", help="Scenario with the tree's settings.")
-    ] = ("release15"),
+    manager: Annotated[str, argument("bt, bt_extended, or module:Class with a tree.", "MANAGER")],
+    scenario: Annotated[str, argument("Scenario with the tree's settings.", "SCENARIO")] = (
+        "release15"
+    ),
 ) -> None:
     """Draw the behaviour tree of a manager."""
     from suave_des.simulation.mission import Mission

@@ -19,7 +19,13 @@ from suave_des import __version__
 from suave_des.cli import campaign, files, results
 from suave_des.cli.console import plain
 from suave_des.cli.kb import commands as kb
-from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
+from suave_des.cli.options import (
+    CONTEXT,
+    CommandsUnderHeadings,
+    Headings,
+    flag,
+    remember_command_line,
+)
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.files import NO_SPACE
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
@@ -94,9 +100,7 @@ def _print_version(wanted: bool) -> None:
 def _options(
     version: Annotated[
         bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
-        ),
+        flag("--version", "Print the version and exit.", callback=_print_version, is_eager=True),
     ] = False,
 ) -> None:
     """Options of the command itself."""

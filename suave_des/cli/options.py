@@ -50,28 +50,44 @@ complete_managers = _completing(lambda: import_module("suave_des.registry").mana
 complete_metrics = _completing(lambda: import_module("suave_des.records.metrics").METRICS)
 complete_scenarios = _completing(_scenarios)
 
+
+def argument(text: str, metavar: str, **shown_as: Any) -> Any:
+    """Declare an argument with its help."""
+    return typer.Argument(metavar=metavar, help=text, **shown_as)
+
+
+def option(text: str, metavar: str | None = None, *names: str, **shown_as: Any) -> Any:
+    """Declare an option with its help, and its names, if they are not its parameter's."""
+    return typer.Option(*names, metavar=metavar, help=text, **shown_as)
+
+
+def flag(name: str, text: str, **shown_as: Any) -> Any:
+    """Declare an option without a value."""
+    return typer.Option(name, help=text, **shown_as)
+
+
 ScenarioArgument = Annotated[
     str,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="A scenario file, or the name of a shipped one.",
+    argument(
+        "A scenario file, or the name of a shipped one.",
+        "SCENARIO",
         autocompletion=complete_scenarios,
     ),
 ]
 Results = Annotated[
     list[Path],
-    typer.Argument(metavar="DIR...", help="Result folders, or the exemplar's CSV files."),
+    argument("Result folders, or the exemplar's CSV files.", "DIR..."),
 ]
 Modes = Annotated[
     Path | None,
-    typer.Option("--modes", metavar="FILE", help="System Modes file instead of the scenario's."),
+    option("System Modes file instead of the scenario's.", "FILE"),
 ]
 ReasonerOption = Annotated[
     str | None,
-    typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow)."),
+    option("cached, pellet, or owlready2 (slow).", "NAME"),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
-Workers = Annotated[int, typer.Option("--workers", help="Worker processes.")]
+Seed = Annotated[int, option("Random seed.")]
+Workers = Annotated[int, option("Worker processes.")]
 
 
 def any_scenario(default: str | Literal[False]) -> Any:
@@ -79,9 +95,7 @@ def any_scenario(default: str | Literal[False]) -> Any:
     shown.
     """
     text = "A scenario or campaign file, or a shipped scenario."
-    return typer.Argument(
-        metavar="SCENARIO", help=text, show_default=default, autocompletion=complete_scenarios
-    )
+    return argument(text, "SCENARIO", show_default=default, autocompletion=complete_scenarios)
 
 
 def managers_option(text: str, default: str | None = None, *names: str) -> Any:
@@ -106,19 +120,13 @@ def _quiet(context: typer.Context, value: bool) -> bool:
     return value
 
 
-Quiet = Annotated[
-    bool, typer.Option("--quiet", callback=_quiet, help="Show no progress, and no warnings.")
-]
-Trusted = Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")]
-Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace earlier results in the output folder.")
-]
+Quiet = Annotated[bool, flag("--quiet", "Show no progress, and no warnings.", callback=_quiet)]
+Trusted = Annotated[bool, flag("--yes", "Trust the code that DIR names.")]
+Overwrite = Annotated[bool, flag("--overwrite", "Replace earlier results in the output folder.")]
 ManagerOptions = Annotated[
     list[str] | None,
-    typer.Option(
-        "--manager-option",
-        metavar="[MANAGER.]KEY=VALUE",
-        help="Setting of a manager, or of all that are not built in; repeatable.",
+    option(
+        "Setting of a manager, or of all that are not built in; repeatable.", "[MANAGER.]KEY=VALUE"
     ),
 ]
 Given = dict[str, Any]
@@ -208,21 +216,16 @@ class KnowledgeFiles:
 
     ontology: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="Ontology instead of the scenario's; repeatable."),
+        option("Ontology instead of the scenario's; repeatable.", "FILE"),
     ] = None
     rules: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE", help="File of rules to add to the ontologies; repeatable."),
+        option("File of rules to add to the ontologies; repeatable.", "FILE"),
     ] = None
-    disable_rule: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Rule to disable; repeatable.")
-    ] = None
+    disable_rule: Annotated[list[str] | None, option("Rule to disable; repeatable.", "NAME")] = None
     set: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="KEY=VALUE",
-            help="Value of the scenario, such as visibility.period_s=40; repeatable.",
-        ),
+        option("Value of the scenario, such as visibility.period_s=40; repeatable.", "KEY=VALUE"),
     ] = None
 
     @property

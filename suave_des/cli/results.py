@@ -5,6 +5,7 @@ for a browser.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -21,11 +22,14 @@ from suave_des.cli.options import (
     Results,
     Trusted,
     any_scenario,
+    argument,
     check_no_use,
     comma_separated,
     command_line,
     complete_metrics,
+    flag,
     managers_option,
+    option,
 )
 from suave_des.errors import InputError
 from suave_des.errors import shown as quoted
@@ -42,6 +46,8 @@ from suave_des.files import (
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.reality.validation import Validation
     from suave_des.records.mission_folder import MissionRecord
@@ -59,9 +65,7 @@ FigureKind = Literal["auto", "map", "timeline", "distributions", "differences", 
 
 Labels = Annotated[
     list[str] | None,
-    typer.Option(
-        metavar="NAME=TEXT", help="Show this text instead of a manager's name; repeatable."
-    ),
+    option("Show this text instead of a manager's name; repeatable.", "NAME=TEXT"),
 ]
 
 
@@ -82,53 +86,39 @@ def compare(
     managers: Annotated[str | None, managers_option("Only these, in this order.", "all")] = None,
     against: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Compare all others with this one only.",
-            show_default="each with each",
-        ),
+        option("Compare all others with this one only.", "NAME", show_default="each with each"),
     ] = None,
     label: Labels = None,
     metrics: Annotated[
         str | None,
-        typer.Option(
-            metavar="COLUMN,...",
-            help="Columns of runs.csv.",
+        option(
+            "Columns of runs.csv.",
+            "COLUMN,...",
             show_default="search time, distance, found, reaction time",
             autocompletion=complete_metrics,
         ),
     ] = None,
     by: Annotated[
         str | None,
-        typer.Option(metavar="KEY,...", help="Compare values of these swept parameters, too."),
+        option("Compare values of these swept parameters, too.", "KEY,..."),
     ] = None,
     half_width: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="METRIC:VALUE",
-            help="Estimate the runs needed for an interval this narrow; repeatable.",
-        ),
+        option("Estimate the runs needed for an interval this narrow; repeatable.", "METRIC:VALUE"),
     ] = None,
-    unpaired: Annotated[
-        bool, typer.Option("--unpaired", help="Treat runs as independent.")
-    ] = False,
+    unpaired: Annotated[bool, flag("--unpaired", "Treat runs as independent.")] = False,
     assisted_by: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="DIR... are real missions; this is a campaign under the same conditions.",
-        ),
+        option("DIR... are real missions; this is a campaign under the same conditions.", "DIR"),
     ] = None,
     population: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="With --assisted-by: a campaign under many such conditions."
-        ),
+        option("With --assisted-by: a campaign under many such conditions.", "DIR"),
     ] = None,
-    as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = "table",
+    as_format: Annotated[CompareFormat, option("Output format.", None, "--format")] = "table",
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing."),
+        option("Write .csv, .json, .md or .tex instead of printing.", "FILE"),
     ] = None,
 ) -> None:
     """Compare managers by their results.
@@ -145,10 +135,11 @@ def compare(
         check_ending(out, _ENDINGS, "a table")
         check_output_file(out, overwrite=True)
     names, columns, points = map(comma_separated, (managers, metrics, by))
-    if (assisted_by is None) != (population is None):
+    simulated = [each for each in (assisted_by, population) if each is not None]
+    if len(simulated) == 1:
         remedy = "give both: suave-des campaign makes them"
         raise InputError("--assisted-by and --population are needed together", remedy=remedy)
-    if assisted_by is not None:
+    if simulated:
         unused = {
             "--by": by,
             "--against": against,
@@ -158,14 +149,10 @@ def compare(
         check_no_use(unused, "with --assisted-by")
     labels = _labels(label)
     missions = read_missions(results, labels)
-    simulated = [
-        read_missions([folder], labels)
-        for folder in (assisted_by, population)
-        if folder is not None
-    ]
     comparison: Written
     if simulated:
-        comparison = compare_assisted(missions, simulated, names, columns)
+        others = [read_missions([each], labels) for each in simulated]
+        comparison = compare_assisted(missions, others, names, columns)
     else:
         groups = grouped(missions, names, columns, points)
         with counted("comparing", errors()) as show:
@@ -194,25 +181,23 @@ def validate(
     scenario: Annotated[str | None, any_scenario(DEFAULT_SCENARIO)] = None,
     data: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="FILE",
-            help="Real missions; repeatable. By default those published for the scenario, or else the"
+        option(
+            "Real missions; repeatable. By default those published for the scenario, or else the"
             " 60 of the SUAVE paper.",
+            "FILE",
             show_default=False,
         ),
     ] = None,
     runs_file: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Compare this runs.csv; nothing is simulated."),
+        option("Compare this runs.csv; nothing is simulated.", "FILE"),
     ] = None,
     managers: Annotated[
         str | None, managers_option("Managers to compare; by default all in the data.")
     ] = None,
     targets: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."
-        ),
+        option("Shares to compare; by default NAME.targets.yaml beside NAME.csv.", "FILE"),
     ] = None,
     *,
     options: Annotated[
@@ -228,9 +213,7 @@ def validate(
     ],
     strict: Annotated[
         bool,
-        typer.Option(
-            "--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met."
-        ),
+        flag("--strict", f"Exit with status {TARGETS_NOT_MET} unless every target is met."),
     ] = False,
     quiet: Quiet = False,
     files: Files,
@@ -268,17 +251,14 @@ def validate(
         made: dict[str, object] = {"runs_file": _provenance(runs_file, recorded.files[runs_file])}
     else:
         runs = options.get("runs", -(-_RUNS // max(1, len(conditions))))
-        result = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
-        simulated = result.frame()
-        if not set(result.campaign.spec.managers) <= set(simulated["manager"]):
-            exit_telling_failures(result)  # there is nothing to compare
+        result, simulated = _simulated(name, chosen, {**options, "runs": runs}, files, quiet=quiet)
         made = {"scenario": result.campaign.loaded.scenario.name, "runs": runs}
     validation = compare(
         real.frame, numbered(simulated, conditions), chosen, shares=shares, limits=limits, seed=seed
     )
     _print_validation(validation, real)
     sources = {
-        "data": [_provenance(path, digest) for path, digest in real.files.items()],
+        "data": list(starmap(_provenance, real.files.items())),
         "targets": list(map(_shown, targets_paths)),
         "seed": seed,
     }
@@ -306,15 +286,19 @@ def _recorded(file: Path, columns: Sequence[str], managers: Sequence[str], optio
 
 def _simulated(
     name: str, managers: Sequence[str], options: Given, files: Files, *, quiet: bool
-) -> CampaignResult:
-    """Run the missions to compare."""
+) -> tuple[CampaignResult, DataFrame]:
+    """Run the missions to compare; exit if a manager has none."""
     from suave_des.campaign.campaign import run_campaign
 
     if "out" in options:
         check_beside(options["out"], VALIDATION_FILES)
     settings: Given = {"workers": None, "command": command_line(), **options}
     with progress.shown(name, quiet=quiet) as show:
-        return run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
+        result = run_campaign(name, managers, on_progress=show, **settings, **files.replacements)
+    frame = result.frame()
+    if not set(result.campaign.spec.managers) <= set(frame["manager"]):
+        exit_telling_failures(result)
+    return result, frame
 
 
 def _print_validation(validation: Validation, real: Runs) -> None:
@@ -359,21 +343,17 @@ def _is_shipped(path: Path) -> bool:
 
 
 def figure(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Result folders or CSV files.")
-    ],
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")
-    ],
+    folders: Annotated[list[Path], argument("Result folders or CSV files.", "DIR...")],
+    out: Annotated[Path, option("Picture to write: .png, .pdf or .svg.", "FILE")],
     kind: Annotated[
         FigureKind,
-        typer.Option(
-            help="Of a mission: map, timeline; of a campaign: distributions, differences; of a sweep: sweep, heatmap."
+        option(
+            "Of a mission: map, timeline; of a campaign: distributions, differences; of a sweep: sweep, heatmap."
         ),
     ] = "auto",
     parameters: Annotated[
         str | None,
-        typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all"),
+        option("Swept parameters to draw.", "KEY,...", show_default="all"),
     ] = None,
     label: Labels = None,
 ) -> None:
@@ -393,20 +373,16 @@ def figure(
     print(f"drawn in {out}")
 
 
-Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
+Open = Annotated[bool, flag("--open", "Show the page in the browser.")]
 
 
 def replay(
     folders: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="[DIR]...",
-            help="Folder of a campaign, or one or two of run.",
-            show_default=False,
-        ),
+        argument("Folder of a campaign, or one or two of run.", "[DIR]...", show_default=False),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead.")
+        str | None, option("Run missions of this scenario instead.", "SCENARIO")
     ] = None,
     managers: Annotated[
         str | None,
@@ -416,19 +392,15 @@ def replay(
             "--manager",
         ),
     ] = None,
-    run: Annotated[int, typer.Option(metavar="K", help="Run number.")] = 1,
-    seed: Annotated[int | None, typer.Option(help="Random seed.", show_default="1")] = None,
+    run: Annotated[int, option("Run number.", "K")] = 1,
+    seed: Annotated[int | None, option("Random seed.", show_default="1")] = None,
     point: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default="0"),
+        option("Point of the campaign's sweep.", "N", show_default="0"),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Page to write.",
-            show_default="replay.html, in DIR or the current folder",
-        ),
+        option("Page to write.", "FILE", show_default="replay.html, in DIR or the current folder"),
     ] = None,
     show: Open = False,
     yes: Trusted = False,
@@ -484,15 +456,11 @@ def report(
     results: Results,
     paths: Annotated[
         int,
-        typer.Option(
-            metavar="N", min=0, max=100, help="Runs of each manager with path and timeline."
-        ),
+        option("Runs of each manager with path and timeline.", "N", min=0, max=100),
     ] = 12,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"
-        ),
+        option("Page to write.", "FILE", show_default="report.html, in the first DIR"),
     ] = None,
     label: Labels = None,
     show: Open = False,

@@ -43,19 +43,25 @@ def page(
     content: object,
     styles: Sequence[str],
     scripts: Sequence[str],
-    **blocks: str,
+    library: str = "",
 ) -> str:
     """Put a page together of assets by their names, a title as plain text, and plain data.
 
-    The scripts share one scope, in their order; `blocks` are further text that the HTML has a place
-    for.
+    The scripts share one scope, in their order; `library` is compressed, and runs before what needs
+    it.
     """
-    return Template(asset(name)).substitute(
+    if library:  # which is a blob once it is expanded
+        script_sources = "'unsafe-inline' blob:"
+    else:
+        script_sources = "'unsafe-inline'"
+    return Template(asset("page.html")).substitute(
+        script_sources=script_sources,
         title=html.escape(title),
         style="\n".join(map(asset, styles)),
+        body=asset(name),
         data=data_text(content),
+        library=library,
         script="(() => {\n'use strict';\n" + "\n".join(map(asset, scripts)) + "\n})();",
-        **blocks,
     )
 
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
-from itertools import accumulate
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
 
 from suave_des import __version__
 from suave_des.api import run_mission
@@ -163,9 +165,7 @@ def mission_on_page(mission: MissionRecord) -> Plain:
     }
     events = mission.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
-    x_m, y_m, seen_s = (
-        metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s")
-    )
+    seen = [metrics.get(f"detection_{name}") for name in ("time_s", "x_m", "y_m")]
     return {
         "name": mission.name,
         "metrics": metrics,
@@ -174,9 +174,9 @@ def mission_on_page(mission: MissionRecord) -> Plain:
         "thrusters": list(_thruster_reports(mission)),
         "adaptations": sorted({each.t_s for each in adaptations(mission)}),
         "events": [(round(t_s, 2), *words) for t_s, *words in events],
-        "inspected": _inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
-        "way": [] if way is None else way[:, :2].round(_DECIMALS).tolist(),
-        "seen": None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
+        "inspected": list(_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ()))),
+        "way": way[:, :2].round(_DECIMALS).tolist(),
+        "seen": None if None in seen else seen,
         "cycles": explain_cycles(mission),
     }
 
@@ -189,47 +189,42 @@ def _thruster_reports(mission: MissionRecord) -> Iterator[tuple[float, int, bool
             yield t_s, int(number), status != FAILED
 
 
-def _way(mission: MissionRecord) -> Array | None:
-    """The way along the pipeline from the point that was seen first, see `there_and_back`."""
+def _way(mission: MissionRecord) -> Array:
+    """The way along the pipeline from the point that was seen first, see `there_and_back`; of no
+    points, if none was.
+    """
     pipeline = mission.settings.pipeline
     points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
     for _, seen in happenings(mission, PipelineDetected):
         if seen.point < len(points):
             return there_and_back(points)[seen.point :]
-    return None
+    return np.empty((0, 3))
 
 
 def _inspected(
-    mission: MissionRecord, way: Array | None, modes: Sequence[tuple[float, str]]
-) -> list[tuple[float, int, float]]:
+    mission: MissionRecord, way: Array, modes: Sequence[tuple[float, str]]
+) -> Iterator[tuple[float, int, float]]:
     """The points of the way that the vehicle reached while it followed the pipeline, each after the
     one before.
     """
-    if way is None:
-        return []
     follow = mission.settings.revision.follow
-    mode_times = [t_s for t_s, _ in modes]
-    lengths_m = list(accumulate(way[:, 2].tolist()))
-    points = way[:, :2].tolist()
-    track = mission.trajectory
-    found: list[tuple[float, int, float]] = []
+    follows = [False, *(mode != UNGROUND_MODE for _, mode in modes)]
+    lengths_m = np.cumsum(way[:, 2]).tolist()
     next_point = 0
     was_following = False
     start_m = 0.0
-    for t_s, x_m, y_m in zip(track["t_s"], track["x_m"], track["y_m"], strict=True):
-        place = bisect_right(mode_times, t_s) - 1
-        is_following = place >= 0 and modes[place][1] != UNGROUND_MODE
+    places = mission.trajectory[["t_s", "x_m", "y_m"]].to_numpy()
+    for t_s, *place in places.tolist() if len(way) else ():
+        is_following = follows[bisect_right(modes, t_s, key=itemgetter(0))]
         if is_following and not was_following:
             next_point = 0 if follow.restarts_on_activation else next_point
-            start_m = lengths_m[min(next_point, len(points) - 1)]
+            start_m = lengths_m[min(next_point, len(way) - 1)]
         was_following = is_following
-        while is_following and next_point < len(points):
-            goal_x_m, goal_y_m = points[next_point]
-            if max(abs(x_m - goal_x_m), abs(y_m - goal_y_m)) > follow.acceptance_m:
+        while is_following and next_point < len(way):
+            if np.abs(way[next_point, :2] - place).max() > follow.acceptance_m:
                 break
-            found.append((round(t_s, 2), next_point, round(lengths_m[next_point] - start_m, 2)))
+            yield round(t_s, 2), next_point, round(lengths_m[next_point] - start_m, 2)
             next_point += 1
-    return found
 
 
 # Cycles
@@ -263,25 +258,18 @@ def explain_cycles(mission: MissionRecord) -> Plain:
             base, ManagingSettings.of(scenario), scenario.knowledge.reasoner, limit
         )
     except InputError as error:
-        cycles += [_cycle(record, -1, []) for record in mission.knowledge]
+        cycles += map(_cycle, mission.knowledge)
         return known | {"note": f"Decisions are not explained: {error}"}
     explainer = _Explainer(knowledge)
     for record in mission.knowledge:
         try:
             reasoning = knowledge.infer(record.state)
-            cycles.append(
-                _cycle(
-                    record,
-                    explainer.inferred(record.t_s, reasoning),
-                    list(explainer.decided(reasoning)),
-                )
-            )
+            inferred = explainer.inferred(record.t_s, reasoning)
+            cycles.append(_cycle(record, inferred, list(explainer.decided(reasoning))))
         except KnowledgeError as error:
-            note = (
-                note
-                or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
-            )
-            cycles.append(_cycle(record, -1, []))
+            missing = "the knowledge base gives no conclusion"
+            note = note or f"At {record.t_s:.1f} s {missing}: {error.problem}"
+            cycles.append(_cycle(record))
     rules = {
         rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
         for rule in knowledge.base.content.enabled_rules
@@ -298,10 +286,12 @@ def _base(mission: MissionRecord) -> tuple[Ontology, str]:
     # A file beside the scenario has its name from there in the scenario, and its path among the
     # inputs.
     paths = {Path(name).name: Path(name) for name in mission.inputs if Path(name).is_file()}
-    ontologies, rules = (
-        [paths.get(Path(name).name) or find(name, "ontology") for name in names]
-        for names in (knowledge.ontologies, knowledge.rules)
-    )
+
+    def found(name: str) -> Path:
+        return paths.get(Path(name).name) or find(name, "ontology")
+
+    ontologies = list(map(found, knowledge.ontologies))
+    rules = list(map(found, knowledge.rules))
     base = read_base(mission.settings, ontologies, rules)
     return base, _note_on_changes(mission, hashes((*ontologies, *rules)))
 
@@ -364,7 +354,7 @@ class _Explainer:
             }
 
 
-def _cycle(record: KnowledgeRecord, inferred: int, decided: Sequence[Plain]) -> Plain:
+def _cycle(record: KnowledgeRecord, inferred: int = -1, decided: Sequence[Plain] = ()) -> Plain:
     state = record.state
     return {
         "t_s": round(record.t_s, 2),
@@ -389,9 +379,9 @@ def _step(derivation: Derivation) -> Plain:
 
 def _shown(value: object) -> str:
     """A bound value, a number with three decimals at most."""
-    return (
-        f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)
-    )
+    if isinstance(value, Decimal):
+        return f"{float(value):.3f}".rstrip("0").rstrip(".")
+    return str(value)
 
 
 def adaptation_rules(record: MissionRecord) -> Rules:

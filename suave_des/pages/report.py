@@ -222,31 +222,24 @@ def _ways(folders: Sequence[Path], missions: Missions, runs: int) -> dict[str, o
     with the times at which they changed.
     """
     frame = missions.frame
-    ways: dict[str, object] = {"pipeline": [], "paths": [], "note": ""}
-    if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
-        return ways | {
-            "note": "Paths and timelines are in the report of one campaign's folder only"
-        }
-    if runs == 0:
-        return ways | {
-            "note": "Paths and timelines are left out; suave-des report --paths N adds those of N runs"
-        }
+    vertices: list[tuple[float, float]] = []
+    paths: list[dict[str, object]] = []
     managers = list(dict.fromkeys(frame["manager"]))
-    try:
-        opened = opened_campaign(folders[0])
-        vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
-        paths = list(
-            _paths(opened, missions, managers, max(1, min(runs, _MOST_WAYS // len(managers))))
-        )
-    except SuaveDesError as error:
-        return ways | {
-            "note": f"Paths and timelines are left out: {getattr(error, 'problem', error)}"
-        }
-    return {
-        "pipeline": vertices,
-        "paths": paths,
-        "note": "" if paths else "No mission could be run again as it was",
-    }
+    if len(folders) != 1 or not folders[0].is_dir() or frame["run"].isna().any():
+        note = "Paths and timelines are in the report of one campaign's folder only"
+    elif runs == 0:
+        added = "suave-des report --paths N adds those of N runs"
+        note = f"Paths and timelines are left out; {added}"
+    else:
+        try:
+            opened = opened_campaign(folders[0])
+            most = max(1, min(runs, _MOST_WAYS // len(managers)))
+            paths = list(_paths(opened, missions, managers, most))
+            vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
+            note = "" if paths else "No mission could be run again as it was"
+        except SuaveDesError as error:
+            note = f"Paths and timelines are left out: {getattr(error, 'problem', error)}"
+    return {"pipeline": vertices, "paths": paths, "note": note}
 
 
 def _paths(
@@ -275,9 +268,8 @@ def _representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: i
             ["search_time_s", "run"], kind="stable"
         )["run"]
         for place in (0, len(own) // 2, len(own) - 1):
-            if len(own):
-                chosen.setdefault(int(own.iloc[place]))
-    chosen |= dict.fromkeys(sorted({int(run) for run in frame["run"]})[:runs])
+            chosen.setdefault(int(own.iloc[place]))
+    chosen |= dict.fromkeys(sorted(frame["run"].astype(int).unique().tolist())[:runs])
     return sorted(list(chosen)[:runs])
 
 
@@ -285,17 +277,15 @@ def _path(result: MissionResult, changes: Sequence[Adaptation]) -> dict[str, obj
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
-    x_m, y_m, altitude_m = np.round(
-        [(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2
-    ).T.tolist()
+    places = [(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some]
+    x_m, y_m, altitude_m = np.round(places, 2).T.tolist()
+    seen_m = map(attrgetter("visibility_m"), some)
     return {
         "t_s": [round(each.t_s, 1) for each in some],
         "x_m": x_m,
         "y_m": y_m,
         "altitude_m": altitude_m,
-        "visibility_m": [
-            None if each.visibility_m is None else round(each.visibility_m, 2) for each in some
-        ],
+        "visibility_m": [None if each is None else round(each, 2) for each in seen_m],
         "modes": [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
         "adaptations": [
             (round(each.t_s, 1), f"{each.function} -> {each.after}") for each in changes

@@ -291,16 +291,15 @@ class RecordedKnowledge:
 
 def knowledge_text(records: Iterable[KnowledgeRecord]) -> str:
     """Return the content of knowledge.jsonl."""
-    cycles = (
-        {
-            "t_s": round(record.t_s, 6),
-            **_plain(record.state),
-            "measurements": _texts(record.state.measurements),
-            **_since(record.state),
-        }
-        for record in records
-    )
-    return "".join(json.dumps(cycle, ensure_ascii=False) + "\n" for cycle in cycles)
+    lines = []
+    for record in records:
+        state = record.state
+        cycle = {"t_s": round(record.t_s, 6), **_plain(state)}
+        cycle["measurements"] = _texts(state.measurements)
+        if state.measured_since is not None:
+            cycle["measured_since"] = _texts(state.measured_since)
+        lines.append(json.dumps(cycle, ensure_ascii=False) + "\n")
+    return "".join(lines)
 
 
 def scenario_line(scenario: Scenario) -> str:
@@ -325,14 +324,14 @@ def mission_line(
     since: dict[str, dict[str, str]] = {}
     for record in records:
         state: KnowledgeState = record.state
-        measured = tuple(name for name, _ in state.measurements)
-        key = (state.objectives, state.groundings, state.components, measured)
+        measured = _texts(state.measurements)
+        key = (state.objectives, state.groundings, state.components, *measured)
         index = states.setdefault(key, len(states))
         if index == len(table):
-            table.append({**_plain(state), "measured": measured})
+            table.append({**_plain(state), "measured": list(measured)})
         if state.measured_since is not None:
             since[str(len(cycles))] = _texts(state.measured_since)
-        cycles.append([round(record.t_s, 6), index, *_texts(state.measurements).values()])
+        cycles.append([round(record.t_s, 6), index, *measured.values()])
     place = {"manager": manager, "point": point, "run": run, "swept": dict(swept)}
     return _line({**place, "states": table, "cycles": cycles, "measured_since": since})
 
@@ -349,12 +348,6 @@ def _plain(state: KnowledgeState) -> dict[str, object]:
 
 def _texts(measured: Iterable[tuple[str, Decimal]]) -> dict[str, str]:
     return {name: format(value, "f") for name, value in measured}
-
-
-def _since(state: KnowledgeState) -> dict[str, dict[str, str]]:
-    """The values with which designs were chosen, where they are others than those before."""
-    since = state.measured_since
-    return {} if since is None else {"measured_since": _texts(since)}
 
 
 def _line(content: Mapping[str, object]) -> str:

@@ -474,15 +474,9 @@ def suave_pieces(
         stamp = _FIRST_STAMP + timedelta(seconds=number)
         # drawn and swept parameters follow
         mission: dict[str, Any] = dict(zip(columns, row, strict=False))
-        mission |= {
-            TIME_LIMIT: time_limit_s,
-            "stamp": stamp,
-            "month": _MONTHS[stamp.month - 1],
-            "name": name,
-        }
-        mission["position"] = str(
-            (round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2))
-        )
+        mission |= {TIME_LIMIT: time_limit_s, "stamp": stamp, "name": name}
+        mission["month"] = _MONTHS[stamp.month - 1]
+        mission["position"] = str(tuple(round(mission[axis], 2) for axis in _START))
         return [rounded(make(mission)) for _, make in layout.values()]
 
     return csv_pieces(tuple(layout), (cells(number, row) for number, row in rows))

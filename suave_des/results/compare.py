@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import pandas
@@ -153,13 +153,14 @@ def _pairs_against(groups: Sequence[Group], against: str) -> list[tuple[Group, G
     by_name = {group.name: group for group in groups}
     managers = dict.fromkeys(group.name.removesuffix(group.point) for group in groups)
     if against not in by_name and against not in managers:
-        raise unknown(
-            f"nothing is called {shown(against)}", against, managers, "there are", "against"
-        )
-    at_points = [
-        (group, by_name.get(against, by_name.get(f"{against}{group.point}"))) for group in groups
-    ]
-    return [(group, chosen) for group, chosen in at_points if chosen and chosen is not group]
+        problem = f"nothing is called {shown(against)}"
+        raise unknown(problem, against, managers, "there are", "against")
+    found = []
+    for group in groups:
+        chosen = by_name.get(against, by_name.get(f"{against}{group.point}"))
+        if chosen and chosen is not group:
+            found.append((group, chosen))
+    return found
 
 
 def _summary(group: Group, metric: Metric) -> TableRow:
@@ -203,7 +204,7 @@ def _difference(
     first: Group,
     second: Group,
     metric: Metric,
-    samples: _Samples,
+    samples: tuple[bool, str, Sample, Sample],
     half_width: float | None,
 ) -> TableRow:
     """Estimate the difference of two groups in one metric, and test it; half_width None: as usual
@@ -272,29 +273,17 @@ def _runs_needed(x: Sample, y: Sample, half_width: float, *, is_paired: bool) ->
     """Return the number of runs that an interval needs, and the gain from pairing; equal values do
     not tell them.
     """
-    if (
-        min(len(x), len(y)) < 2
-        or half_width <= 0.0
-        or not (apart := float(x.var(ddof=1) + y.var(ddof=1)))
-    ):
+    if min(len(x), len(y)) < 2 or half_width <= 0.0:
         return {}
-    row = {
-        "half_width": half_width,
-        "runs_needed_unpaired": statistics.runs_for(math.sqrt(apart), half_width),
-    }
+    apart = float(x.var(ddof=1) + y.var(ddof=1))
+    if not apart:
+        return {}
+    needed = statistics.runs_for(math.sqrt(apart), half_width)
+    row: TableRow = {"half_width": half_width, "runs_needed_unpaired": needed}
     if together := float((x - y).var(ddof=1)) if is_paired else 0.0:
         row["runs_needed_paired"] = statistics.runs_for(math.sqrt(together), half_width)
         row["variance_ratio"] = apart / together
     return row
-
-
-class _Samples(NamedTuple):
-    """The values of two groups, those of the same runs in the same order if they are paired."""
-
-    is_paired: bool
-    why: str
-    first: Sample
-    second: Sample
 
 
 @dataclass(frozen=True)
@@ -324,16 +313,19 @@ def _values(groups: Sequence[Group], metric: str) -> _Values:
     return _Values(metric, alone, by_run, together.index.get_level_values("run").to_numpy(float))
 
 
-def _samples(first: Group, second: Group, values: _Values, *, unpaired: bool) -> _Samples:
-    """Return the values of two groups, paired if their runs share random numbers or conditions."""
+def _samples(
+    first: Group, second: Group, values: _Values, *, unpaired: bool
+) -> tuple[bool, str, Sample, Sample]:
+    """Return whether two groups are paired, as their runs share random numbers or conditions, and
+    why; and their values, if they are paired in the same order of runs.
+    """
     x = values.alone[first.name]
     y = values.alone[second.name]
-    if not unpaired and first.has_runs and second.has_runs:
+    is_paired = not unpaired and first.has_runs and second.has_runs
+    if is_paired:
         both = np.array([values.by_run[first.name], values.by_run[second.name]])
         both = both[:, ~np.isnan(both).any(axis=0)]
         is_paired = both.shape[1] >= min(2, len(x), len(y))
-    else:
-        is_paired = False
     if is_paired:
         why = _why_paired(first, max(len(x), len(y)) - both.shape[1], len(both[0]))
         x, y = both
@@ -341,8 +333,8 @@ def _samples(first: Group, second: Group, values: _Values, *, unpaired: bool) ->
         why = "not paired: as asked" if unpaired else _why_apart(first, second)
     if values.metric in TIMES and first.horizon_s != second.horizon_s:
         horizon_s = min(first.horizon_s, second.horizon_s)
-        return _Samples(is_paired, why, np.minimum(x, horizon_s), np.minimum(y, horizon_s))
-    return _Samples(is_paired, why, x, y)
+        return is_paired, why, np.minimum(x, horizon_s), np.minimum(y, horizon_s)
+    return is_paired, why, x, y
 
 
 def _why_paired(group: Group, left: int, common: int) -> str:
@@ -354,9 +346,8 @@ def _why_paired(group: Group, left: int, common: int) -> str:
     elif "run_idx" in group.frame:
         why = "paired by run_idx, as the exemplar's own test does"
     else:
-        why = (
-            "paired by run number, as runs with the same seed and number share their random numbers"
-        )
+        share = "runs with the same seed and number share their random numbers"
+        why = f"paired by run number, as {share}"
     if left and common:
         return f"{why}; {what} with a value under only one of them ({left}) are left out"
     return why

@@ -5,7 +5,7 @@ paper's layout.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -164,11 +164,8 @@ class Comparison(Written):
         if len(of_means):
             yield f"Tests of means: {', '.join(of_means.unique())}; two-sided{_over_all(len(of_means))}."
         yield from (_EFFECTS[name] for name in tested["effect_name"].unique() if name)
-        methods = (
-            pandas.concat([self.summaries["mean_interval"], tested["difference_interval"]])
-            .dropna()
-            .unique()
-        )
+        intervals = self.summaries["mean_interval"], tested["difference_interval"]
+        methods = pandas.concat(intervals).dropna().unique()
         if len(methods):
             yield f"95% intervals: {', '.join(methods)}."
 
@@ -204,7 +201,7 @@ class Comparison(Written):
                     name = name.removesuffix(each["point"])
                 cells = metric.number(each["mean"].value), metric.number(each["std"])
                 rows.setdefault(each["group"], [name]).extend(cells)
-        shown = [row for row in rows.values() if len(row) == 1 or any(row[1:])]
+        shown = [row for row in rows.values() if {*row[1:]} != {""}]
         headings = ("Manager", *("Mean", "Std") * len(metrics))
         table = Table(headings, shown, "Means and standard deviations.")
         over = [capital(metric.heading) for metric in metrics]
@@ -268,6 +265,10 @@ def _of_metric(rows: Sequence[TableRow], metric: Metric) -> list[TableRow]:
     return [each for each in rows if each["metric"] == metric.name]
 
 
+def _names_of(pair: TableRow) -> str:
+    return f"{pair['group']} - {pair['other']}"
+
+
 def _over_all(tests: int) -> str:
     return f", Holm's correction over all {tests}" if tests > 1 else ""
 
@@ -298,13 +299,8 @@ def _search_table(summaries: Sequence[TableRow]) -> Table:
     """
     known = [each for each in summaries if each["horizon_s"] is not None]
     horizon_s = min((each["horizon_s"] for each in known), default=0.0)
-    headings = (
-        "manager",
-        f"mean to {horizon_s:.0f} s",
-        "95% interval",
-        "half found by",
-        "95% interval",
-    )
+    mean_to = f"mean to {horizon_s:.0f} s"
+    headings = ("manager", mean_to, "95% interval", "half found by", "95% interval")
     rows = []
     for each in known:
         mean = each["restricted_mean_s"]
@@ -332,7 +328,7 @@ def _difference_table(metric: Metric, differences: Sequence[TableRow]) -> Table:
 
 def _difference_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
     sizes = dict.fromkeys((each["n"], each["n_other"]))
-    names = f"{each['group']} - {each['other']}", ", ".join(f"{n:,}" for n in sizes)
+    names = _names_of(each), ", ".join(f"{n:,}" for n in sizes)
     if not each["test"]:
         return *names, "", "", "", "", ""
     mean = each["difference"]
@@ -352,15 +348,12 @@ def _difference_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
 def _runs_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
     ratio = "" if each["variance_ratio"] is None else f"{each['variance_ratio']:.1f}"
     paired = f"{each['runs_needed_paired']:,}" if each["runs_needed_paired"] else ""
-    unpaired = (
-        f"{each['runs_needed_unpaired']:,}" if each["runs_needed_unpaired"] else "over 10,000,000"
-    )
-    half = (
-        f"{100 * each['half_width']:g} points"
-        if metric.name == FOUND
-        else f"{each['half_width']:.4g} {metric.unit}"
-    )
-    return f"{each['group']} - {each['other']}", half.strip(), paired, unpaired, ratio
+    needed = each["runs_needed_unpaired"]
+    unpaired = f"{needed:,}" if needed else "over 10,000,000"
+    half = f"{each['half_width']:.4g} {metric.unit}".strip()
+    if metric.name == FOUND:
+        half = f"{100 * each['half_width']:g} points"
+    return _names_of(each), half, paired, unpaired, ratio
 
 
 def _p(p: float) -> str:
@@ -394,22 +387,17 @@ def concluded(
     notes = (*groups.missions.notes, *groups.notes, *_worse_paired(differences))
     points = {group.name: group.point for group in groups.groups}
     of_groups = [
-        dict.fromkeys(_SUMMARY) | {"mean": Estimate(), "point": points[row["group"]]} | dict(row)
+        dict.fromkeys(_SUMMARY) | {"mean": Estimate(), "point": points[row["group"]]} | row
         for row in summaries
     ]
-    of_pairs = [
-        dict.fromkeys(_DIFFERENCE) | {"point": _common_point(points, row)} | row
-        for row in differences
-    ]
+    of_pairs = []
+    for row in differences:
+        point = points[row["group"]]
+        common = point if point == points[row["other"]] else ""
+        of_pairs.append(dict.fromkeys(_DIFFERENCE) | {"point": common} | row)
     return Comparison(
         sentences, notes, of_groups, of_pairs, groups.metrics, groups.counted, largest, replay
     )
-
-
-def _common_point(points: Mapping[str, str], row: TableRow) -> str:
-    """Return the point of a sweep at which both groups of a pair are; empty if there is none."""
-    point = points[row["group"]]
-    return point if point == points[row["other"]] else ""
 
 
 def _frame(rows: Sequence[TableRow], columns: tuple[str, ...]) -> pandas.DataFrame:
@@ -487,7 +475,7 @@ def _lost(groups: Groups, names: Sequence[str]) -> str:
 def _worse_paired(differences: Sequence[TableRow]) -> Iterator[str]:
     """Yield a note on pairs whose differences vary more than those of independent runs would."""
     worse = [
-        f"{each['group']} - {each['other']} in {each['metric']} ({1.0 / each['variance_ratio']:.1f} times)"
+        f"{_names_of(each)} in {each['metric']} ({1.0 / each['variance_ratio']:.1f} times)"
         for each in differences
         if each.get("variance_ratio", 1.0) < _WORSE
     ]

@@ -8,7 +8,7 @@ and what one of them shows is not said of another.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from suave_des.errors import number_of
 from suave_des.estimates import Estimate, percent
@@ -33,19 +33,15 @@ def conclusion(found: TableRow, metric: Metric) -> str:
     group = found["group"]
     other = found["other"]
     if not found["test"]:
-        return (
-            f"{group} and {other} cannot be compared in {metric.title}: one of them has no value."
-        )
+        why = "one of them has no value"
+        return f"{group} and {other} cannot be compared in {metric.title}: {why}."
     if _is_equal(found):
         pairs = number_of(found["n"], "pair")
         return f"{group} and {other} have the same {metric.title} in all {pairs}."
     if _is_of_shares(found):
         return _sentence_of_means(found, metric)
-    sentences = [
-        _sentence_of_means(found, metric),
-        _sentence_of_ranks(found, metric),
-        _sentence_of_pairs(found, metric),
-    ]
+    questions = (_sentence_of_means, _sentence_of_ranks, _sentence_of_pairs)
+    sentences = [sentence(found, metric) for sentence in questions]
     direction = _direction_of_ranks(found) * found["difference"].value
     if _has_mean_shown(found) and _has_ranks_shown(found) and direction < 0.0:
         sentences.append("Means and ranks disagree: the distributions differ in shape.")
@@ -279,18 +275,20 @@ def overall_conclusion(
         return f"No two of them have a {metric.title} that could be compared."
     if len(own) == 1 or not metric.better or len(means) < 2:
         return " ".join(each["conclusion"] for each in own[:_MOST_SENTENCES])
+    return " ".join(_about_best(metric, own, means, len(groups) - 1))
+
+
+def _about_best(
+    metric: Metric, own: Sequence[TableRow], means: Mapping[str, float], others: int
+) -> Iterator[str]:
+    """Yield what means, ranks and pairs show of the best mean; of shares, means only."""
     best = max(means, key=lambda name: metric.better * means[name])
     against = [each for each in own if best in (each["group"], each["other"])]
-    sentences = _means_of_best(best, metric, against, means, len(groups) - 1)
-    return " ".join([*sentences, *_ranks_and_pairs_of_best(best, metric, against)])
-
-
-def _ranks_and_pairs_of_best(best: str, metric: Metric, against: Sequence[TableRow]) -> list[str]:
-    """Write what ranks and pairs show of the best mean, where there are any."""
+    yield from _means_of_best(best, metric, against, means, others)
     ranked = [each for each in against if not _is_of_shares(each) and not _is_equal(each)]
-    if not ranked:
-        return []
-    return [_ranks_of_best(best, metric, ranked), _pairs_of_best(best, metric, ranked)]
+    if ranked:
+        yield _ranks_of_best(best, metric, ranked)
+        yield _pairs_of_best(best, metric, ranked)
 
 
 def _is_about(found: TableRow, metric: Metric, groups: Sequence[str]) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from operator import attrgetter
 from pathlib import Path
 from textwrap import fill
@@ -22,7 +22,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ from suave_des.results.independent import (
 )
 from suave_des.results.mission import Rules, draw_map, draw_timeline
 from suave_des.results.statistics import least_and_greatest
-from suave_des.results.style import folded, key_words, value_words
+from suave_des.results.style import folded, handle, key_words, value_words
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -74,20 +73,21 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     labels = [*map(_label, groups), "markers on the axis: means"]
     rows = math.ceil(len(labels) / _legend_columns(labels))
     legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
+    figure = style.Picture(2.5 + legend_in)
     for axes, metric, title in _metric_panels(figure):
-        ends = [float(_finite(group.frame[metric]).max()) for group in groups]
+        ends = [_finite(group.frame[metric]).max() for group in groups]
         end = max(1.0, np.nanmax(ends) * 1.06)
         for number, group in _looks(groups):
-            values = np.sort(_finite(group.frame[metric]))
-            shares = np.arange(1, len(values) + 1) / group.frame[metric].count()
+            of_group = group.frame[metric]
+            values = np.sort(_finite(of_group))
+            shares = np.arange(1, len(values) + 1) / of_group.count()
             look = style.line(number)
             steps = [0.0, *shares, *shares[-1:]]
             axes.step(
                 [0.0, *values, end][: len(steps)], steps, where="post", label=_label(group), **look
             )
             axes.plot(
-                float(group.frame[metric].mean()),
+                of_group.mean(),
                 0.0,
                 clip_on=False,
                 zorder=5,
@@ -116,12 +116,12 @@ def draw_distributions(drawn: Groups) -> style.Picture:
     times.set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     times.yaxis.set_major_formatter(PercentFormatter(1.0))
     curves = [
-        Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number))
+        handle(marker=style.marker(number), ms=3.5, **style.line(number))
         for number, _ in _looks(groups)
     ]
     _legend(
         figure,
-        [*curves, Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)],
+        [*curves, handle(lw=0, marker="o", mfc="none", ms=4, color=style.GREY)],
         labels,
     )
     return figure
@@ -145,7 +145,7 @@ def draw_differences(drawn: Groups) -> style.Picture:
             remedy="give campaigns of two managers or more with the same seed",
         )
     height = _ROW_IN * len(rows) + 0.75 + _LEGEND_LINE_IN
-    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    figure = style.Picture(height)
     is_of_runs = drawn.counted in ("mission", "run")
     for axes, metric, title in _metric_panels(figure):
         axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
@@ -163,8 +163,8 @@ def draw_differences(drawn: Groups) -> style.Picture:
     ]
     left.set_yticks(range(len(rows)), [style.text(folded(name)) for name in names])
     left.set_ylim(len(rows) - 0.4, -0.6)
-    mean = Line2D([], [], lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK)
-    each = Line2D([], [], color=style.GREY, marker="o", ms=2.5, lw=0)
+    mean = handle(lw=1.2, marker="D", ms=3, mfc="white", color=style.BLACK)
+    each = handle(color=style.GREY, marker="o", ms=2.5, lw=0)
     _legend(figure, [mean, each], ["mean, 95% interval", "run" if is_of_runs else drawn.counted])
     return figure
 
@@ -253,21 +253,21 @@ def _label(group: Group) -> str:
     return style.text(folded(f"{group.name} ({text})"))
 
 
-def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    figure.legend(
-        handles, labels, loc="outside upper right", ncols=_legend_columns(labels), handlelength=2.8
-    )
+def _legend(
+    figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str], most: int = 4
+) -> None:
+    """Draw a legend above the panels, in so many columns at most."""
+    columns = min(most, _legend_columns(labels))
+    figure.legend(handles, labels, loc="outside upper right", ncols=columns, handlelength=2.8)
 
 
 def _legend_columns(labels: Sequence[str]) -> int:
     """Return the number of columns with which a legend fits the width of a figure."""
     font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
-    parts = [
-        [TextPath((0.0, 0.0), part, prop=font) for part in label.split("\n")] for label in labels
-    ]
-    widths_in = [
-        _HANDLE_IN + max(float(part.get_extents().x1) for part in each) / 72.0 for each in parts
-    ]
+    widths_in = []
+    for label in labels:
+        parts = [TextPath((0.0, 0.0), part, prop=font) for part in label.split("\n")]
+        widths_in.append(_HANDLE_IN + max(part.get_extents().x1 for part in parts) / 72.0)
     for columns in range(len(labels) if len(labels) <= 4 else 3, 1, -1):
         if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
             return columns
@@ -322,7 +322,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     columns = len(parameters)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     height_in = 4.0 + 0.2 * math.ceil((frame["curve"].nunique() + 1) / 3)
-    figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
+    figure = style.Picture(height_in, width_in)
     panels = figure.subplots(len(PAPER_METRICS), columns, sharex="col", sharey="row", squeeze=False)
     counts: list[int] = []
     for row, metric in zip(panels, PAPER_METRICS, strict=True):
@@ -333,20 +333,14 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     for axes, parameter in zip(panels[-1], parameters, strict=True):
         axes.set_xlabel(_folded(key_words(parameter)))
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    handles.append(Line2D([], [], lw=0, marker="|", ms=8, color=style.GREY))
+    handles.append(handle(lw=0, marker="|", ms=8, color=style.GREY))
     labels.append("95% interval of the mean")
-    ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
-    figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
+    _legend(figure, handles, labels, 3 if columns > 1 else 2)
+    others = [name for name in missions.swept if name not in parameters]
+    below = _averaged(frame, counts, others)
     if len(missions.swept) == columns > 1:
-        _write_below(
-            figure,
-            f"{_averaged(frame, counts, ())}, each averaged over the parameters of the other panels",
-        )
-    else:
-        _write_below(
-            figure,
-            _averaged(frame, counts, [name for name in missions.swept if name not in parameters]),
-        )
+        below += ", each averaged over the parameters of the other panels"
+    _write_below(figure, below)
     return figure
 
 
@@ -382,17 +376,16 @@ def draw_heat_map(missions: Missions, parameters: Sequence[str] = ()) -> style.P
         remedy = f"sweep {_MOST_CELLS} values or fewer, or draw them with --kind sweep"
         raise InputError(problem, place="parameters", remedy=remedy)
     height = len(managers) * (0.34 * len(rows) + 0.3) + 0.9
-    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    figure = style.Picture(height)
     panels = figure.subplots(len(managers), 2, sharex=True, sharey=True, squeeze=False)
-    keys = pandas.MultiIndex.from_tuples(cells, names=["curve", up, across])
     for metric, of_metric in zip(PAPER_METRICS, panels.T, strict=True):
-        means = pandas.Series([_mean(runs[metric]) for runs in cells.values()], keys)
-        values = [mean.value for mean in means]
+        means = {key: _mean(runs[metric]) for key, runs in cells.items()}
+        values = list(map(attrgetter("value"), means.values()))
         ends = np.nanmin(values), np.nanmax(values)
         for axes, manager in zip(of_metric, managers, strict=True):
-            grid = means[manager].unstack(across, fill_value=Estimate())
-            grid = grid.reindex(index=rows, columns=columns, fill_value=Estimate())
-            image = _draw_grid(axes, grid.to_numpy(), METRICS[metric], ends)
+            grid = [means.get((manager, *place), Estimate()) for place in product(rows, columns)]
+            shaped = np.array(grid).reshape(len(rows), len(columns))
+            image = _draw_grid(axes, shaped, METRICS[metric], ends)
             axes.set_title(style.text(folded(manager)))
         figure.colorbar(image, ax=of_metric, label=_folded(f"mean {METRICS[metric].heading}", 20))
         lowest = of_metric[-1]

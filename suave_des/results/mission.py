@@ -37,6 +37,7 @@ from suave_des.results.style import (
     component_words,
     function_mode_words,
     function_words,
+    handle,
     mode_words,
     plain,
 )
@@ -114,11 +115,9 @@ def component_changes(record: MissionRecord) -> Iterator[tuple[float, str, bool]
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return the spans of failures, by failed component."""
-    changes = (
-        (t_s, name, FAILED if is_failed else "")
-        for t_s, name, is_failed in component_changes(record)
-    )
-    return _spans(changes, record.end_s)
+    changes = component_changes(record)
+    failures = ((t_s, name, FAILED if is_failed else "") for t_s, name, is_failed in changes)
+    return _spans(failures, record.end_s)
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
@@ -260,7 +259,7 @@ def draw_map(record: MissionRecord) -> style.Picture:
     """Draw the map of a mission, with altitude, visibility and battery over time."""
     colours = mode_colours(record)
     marks = list(_marks(record))
-    figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
+    figure = style.Picture(5.2)
     panels = figure.subplot_mosaic("aa;bc", height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))
     whole = panels["a"]
     zoom = panels["b"]
@@ -295,35 +294,28 @@ def draw_map(record: MissionRecord) -> style.Picture:
 def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> Iterator[Line2D]:
     moving = [mode for mode in colours if mode not in _IDLE_MODES]
     for mode in (*moving, *_IDLE_MODES[1:2] * (len(moving) < len(colours))):
-        yield Line2D([], [], label=style.text(mode_words(mode)), **_way_look(colours, mode))
-    yield Line2D([], [], **_PIPELINE, label="pipeline")
-    yield Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)")
+        yield handle(label=style.text(mode_words(mode)), **_way_look(colours, mode))
+    yield handle(**_PIPELINE, label="pipeline")
+    yield handle(**_VISIBILITY, label="visibility; dotted: thresholds (c)")
     if battery_level(record) is not None:
-        yield Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
-        yield Line2D(
-            [], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station"
-        )
-    yield Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start")
+        yield handle(color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)")
+        yield handle(color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station")
+    yield handle(color=style.BLACK, lw=0, marker="o", ms=4, label="start")
     if adaptations(record):
-        yield Line2D(
-            [], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation"
-        )
+        yield handle(color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation")
     for mark in marks:
         symbol = rf"$\mathbf{{{mark.letter}}}$"
-        yield Line2D([], [], lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
+        yield handle(lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text)
 
 
 def mode_colours(record: MissionRecord) -> dict[str, str]:
     """Return a colour for each mode, in the order of appearance; what does not move the vehicle is
     grey.
     """
-    modes = list(dict.fromkeys(record.trajectory["mode"]))
     known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
-    others = zip(
-        [mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False
-    )
-    colours = known | dict(others)
-    return {mode: colours[mode] for mode in modes}
+    others = cycle(style.OTHER_MODES)
+    modes = record.trajectory["mode"].unique()
+    return {mode: known.get(mode) or next(others) for mode in modes}
 
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
@@ -534,26 +526,26 @@ def draw_timeline(record: MissionRecord, rules: Rules = MappingProxyType({})) ->
     sentences = _sentences(changes, rules)
     columns = 2 if len(listed) > 6 and max(map(len, sentences)) <= _COLUMN_LETTERS else 1
     list_in = 0.17 * -(-len(sentences) // columns) + 0.1 if changes else 0.01
-    level = battery_level(record)
-    heights = [1.9, *([0.7] if level is not None else []), 0.24 * len(lines) + 0.2, list_in]
-    figure = style.Picture(figsize=(style.WIDTH_IN, sum(heights) + 0.9), layout="constrained")
-    panels = figure.subplots(len(heights), 1, height_ratios=heights)
-    for axes in panels[1:-1]:
-        axes.sharex(panels[0])
-    _draw_altitude(panels[0], record, listed)
-    if level is not None:
-        panels[1].plot(record.trajectory["t_s"], 100.0 * level, color=style.GREEN, lw=1.2)
-        panels[1].set(ylabel="battery (%)", ylim=(0, 105))
-    _draw_lines(panels[-2], lines)
-    for axes in panels[:-2]:
+    battery_in = [] if battery_level(record) is None else [0.7]
+    heights = [1.9, *battery_in, 0.24 * len(lines) + 0.2, list_in]
+    figure = style.Picture(sum(heights) + 0.9)
+    *upper, bars, below = figure.subplots(len(heights), 1, height_ratios=heights)
+    altitude, *battery = upper
+    _draw_altitude(altitude, record, listed)
+    for axes in battery:
+        way = record.trajectory
+        axes.plot(way["t_s"], 100.0 * way["battery_level"], color=style.GREEN, lw=1.2)
+        axes.set(ylabel="battery (%)", ylim=(0, 105))
+    _draw_lines(bars, lines)
+    for axes in upper:
         axes.tick_params(labelbottom=False)
-    panels[0].set_xlim(0.0, record.end_s)
-    panels[-2].set_xlabel("mission time (s)")
-    panels[0].set_title(style.text(record.name), pad=16)
-    for axes in panels[:-1]:
+    for axes in (*upper, bars):
+        axes.set_xlim(0.0, record.end_s)
         for each in changes:
             axes.axvline(each.t_s, color="#777777", lw=0.5, ls=":", zorder=1)
-    _draw_list(panels[-1], sentences, columns)
+    bars.set_xlabel("mission time (s)")
+    altitude.set_title(style.text(record.name), pad=16)
+    _draw_list(below, sentences, columns)
     return figure
 
 
@@ -737,6 +729,5 @@ def _sentences(changes: Sequence[Adaptation], rules: Rules) -> list[str]:
 def _sentence(each: Adaptation, rules: Sequence[str]) -> str:
     before, after = (function_mode_words(each.function, mode) for mode in (each.before, each.after))
     cause = f"rule {', '.join(rules)}" if rules else each.cause
-    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}" + (
-        f" ({cause})" if cause else ""
-    )
+    because = f" ({cause})" if cause else ""
+    return f"{each.t_s:.0f} s  {function_words(each.function)}: {before} to {after}{because}"

@@ -13,6 +13,7 @@ from typing import Any
 
 import matplotlib.style
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from suave_des import domain
 from suave_des.tables import broken_name, printable
@@ -96,13 +97,21 @@ def text(name: str) -> str:
 
 
 class Picture(Figure):
-    """A figure that a notebook shows without further settings."""
+    """A figure that a notebook shows without further settings, by default as wide as a page."""
+
+    def __init__(self, height_in: float, width_in: float = WIDTH_IN) -> None:
+        super().__init__(figsize=(width_in, height_in), layout="constrained")
 
     def _repr_png_(self) -> bytes:
         picture = io.BytesIO()
         with publication():
             self.savefig(picture, format="png", dpi=160)
         return picture.getvalue()
+
+
+def handle(**look: Any) -> Line2D:
+    """Return what stands for a line or a marker in a legend."""
+    return Line2D([], [], **look)
 
 
 @contextmanager

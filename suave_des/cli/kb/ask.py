@@ -10,8 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
-
 from suave_des.cli.console import counted, errors
 from suave_des.cli.kb.options import (
     At,
@@ -22,6 +20,7 @@ from suave_des.cli.kb.options import (
     shown,
     state_at,
 )
+from suave_des.cli.options import argument, flag, option
 from suave_des.errors import InputError
 from suave_des.files import csv_text, write_file
 from suave_des.interrupts import ends_at_once
@@ -93,9 +92,9 @@ def explain(
     options: ReasonerOptions,
     question: Annotated[
         str,
-        typer.Argument(
-            metavar="QUESTION",
-            help='A fact (written as a rule atom), "why DESIGN?" or "why not DESIGN?"; by default all that follows.',
+        argument(
+            'A fact (written as a rule atom), "why DESIGN?" or "why not DESIGN?"; by default all that follows.',
+            "QUESTION",
         ),
     ] = "",
     at: At = None,
@@ -110,12 +109,8 @@ def explain(
 def policy(
     options: ReasonerOptions,
     max_failed: MaxFailed = 2,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")
-    ] = None,
-    png: Annotated[
-        Path | None, typer.Option("--png", metavar="FILE", help="Draw the tables.")
-    ] = None,
+    csv: Annotated[Path | None, option("Write all rows of the table.", "FILE")] = None,
+    png: Annotated[Path | None, option("Draw the tables.", "FILE")] = None,
 ) -> None:
     """Tabulate the decision in every state.
 
@@ -144,15 +139,11 @@ def query(
     options: ReasonerOptions,
     text: Annotated[
         str,
-        typer.Argument(
-            metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known."
-        ),
+        argument("SPARQL; the prefixes suave, tomasys, mros and owl are known.", "QUERY"),
     ],
     at: At = None,
-    inferred: Annotated[
-        bool, typer.Option("--inferred", help="Include what Pellet infers.")
-    ] = False,
-    form: Annotated[TableFormat, typer.Option("--format", help="Output format.")] = "text",
+    inferred: Annotated[bool, flag("--inferred", "Include what Pellet infers.")] = False,
+    form: Annotated[TableFormat, option("Output format.", None, "--format")] = "text",
 ) -> None:
     """Query the knowledge base in SPARQL.
 
@@ -181,12 +172,12 @@ def why_not(
     options: KnowledgeOptions,
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="RULE", help="Rules; by default all that do not fire."),
+        argument("Rules; by default all that do not fire.", "RULE"),
     ] = None,
     at: At = None,
     facts: Annotated[
         list[str] | None,
-        typer.Option("--fact", metavar="FACT", help='Additional fact, such as "Binding(b1)".'),
+        option('Additional fact, such as "Binding(b1)".', "FACT", "--fact"),
     ] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
@@ -209,9 +200,10 @@ def why_not(
     names = names or []
     _tell_of_identities(questions.base, names)
     limit = TimeLimit(time_limit, "--time-limit")
-    answers = [
-        limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire")
-        for name in names or sorted({rule.name for rule in questions.base.rules})
-    ]
-    told = [str(answer) for answer in answers if names or not answer.fires]
+    told = []
+    for name in names or sorted({rule.name for rule in questions.base.rules}):
+        task = f"finding out why {name} does not fire"
+        answer = limit.run(partial(questions.why_not, name, state), task)
+        if names or not answer.fires:
+            told.append(str(answer))
     print("\n".join(told) or "all rules fire")

@@ -17,12 +17,19 @@ from suave_des.campaign import progress
 from suave_des.cli.console import counted, errors
 from suave_des.cli.kb import ask, tests
 from suave_des.cli.kb.options import KnowledgeOptions, MaxFailed, ReasonerOptions, TimeLimitS, shown
-from suave_des.cli.options import CommandsUnderHeadings, Headings, Modes, Quiet, Seed, Workers
+from suave_des.cli.options import (
+    CommandsUnderHeadings,
+    Headings,
+    Modes,
+    Quiet,
+    Seed,
+    Workers,
+    argument,
+    option,
+)
 
 if TYPE_CHECKING:
-    from suave_des.kb.decision_table import DecisionTable
     from suave_des.kb.difference import MissionDifference
-    from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.knowledge.ontology import Ontology
     from suave_des.knowledge.rules import Rule
 
@@ -30,11 +37,9 @@ FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
 OwlFile = Annotated[
     Path,
-    typer.Argument(
-        metavar="FILE", help="An OWL file; its previous version is kept as FILE.bak, FILE.bak2, ..."
-    ),
+    argument("An OWL file; its previous version is kept as FILE.bak, FILE.bak2, ...", "FILE"),
 ]
-RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
+RuleName = Annotated[str, argument("Name of a rule of the file.", "NAME")]
 FindingsFormat = Literal["text", "json"]
 FailOn = Literal["error", "warn"]
 
@@ -42,11 +47,9 @@ FailOn = Literal["error", "warn"]
 def check(
     options: KnowledgeOptions,
     modes: Modes = None,
-    fail_on: Annotated[
-        FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")
-    ] = "error",
+    fail_on: Annotated[FailOn, option("Lowest level that makes the exit status 1.")] = "error",
     time_limit: TimeLimitS = 60.0,
-    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = "text",
+    form: Annotated[FindingsFormat, option("Output format.", None, "--format")] = "text",
 ) -> None:
     """Check ontologies and rules.
 
@@ -119,9 +122,7 @@ def _why_unreadable(rule: Rule, text: str, base: Ontology) -> str | None:
 
 def add_rule(
     file: OwlFile,
-    rule: Annotated[
-        str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')
-    ],
+    rule: Annotated[str, argument('The rule, "name: body -> head", or a .swrl file.', "RULE")],
 ) -> None:
     """Add a rule, or those of a file, to an OWL file; nothing else changes."""
     from suave_des.kb.rule_editor import add_rules, unused_backup
@@ -166,19 +167,15 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
 def try_(
     on: Annotated[
         Path,
-        typer.Option(
-            "--on",
-            metavar="DIR",
-            help="Folder of run, of a campaign that recorded its knowledge, or of such folders.",
+        option(
+            "Folder of run, of a campaign that recorded its knowledge, or of such folders.", "DIR"
         ),
     ],
     rule: Annotated[
         str | None,
-        typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.'),
+        argument('Rule to try, "name: body -> head", or a .swrl file.', "RULE"),
     ] = None,
-    disable: Annotated[
-        str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
-    ] = None,
+    disable: Annotated[str | None, option("Evaluate without this rule.", "NAME")] = None,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
     """Show when a rule would have fired in recorded missions, and what it would have changed.
@@ -197,12 +194,7 @@ class MissionOptions:
 
     missions: Annotated[
         int | None,
-        typer.Option(
-            "--missions",
-            min=1,
-            metavar="N",
-            help="Run N missions with each, and compare them in pairs.",
-        ),
+        option("Run N missions with each, and compare them in pairs.", "N", min=1),
     ] = None
     modes: Modes = None
     seed: Seed = 1
@@ -215,13 +207,13 @@ def diff(
     mission_options: MissionOptions,
     one: Annotated[
         Path,
-        typer.Argument(
-            metavar="A",
-            help="An ontology, a .swrl file of rules to add, or a decision table (.csv, or rosa,"
+        argument(
+            "An ontology, a .swrl file of rules to add, or a decision table (.csv, or rosa,"
             " planta).",
+            "A",
         ),
     ],
-    other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
+    other: Annotated[Path, argument("The same.", "B")],
     max_failed: MaxFailed = 2,
 ) -> None:
     """Compare two ontologies, sets of rules or decision tables: axioms, decisions, missions.
@@ -230,30 +222,31 @@ def diff(
     scenario's. Decisions are compared in every state; missions with the same number use common
     random numbers.
     """
-    from suave_des.kb.decision_table import manager_of
+    from suave_des.kb.decision_table import find_table, manager_of
     from suave_des.kb.difference import compare_axioms
     from suave_des.kb.table_difference import compare_deciders
 
-    tables = list(map(manager_of, (one, other)))
-    both = [_side(options, file) for file in (one, other)]
+    files = (one, other)
+    tables = list(map(manager_of, files))
+    both = [options if manager_of(file) else options.with_file(file) for file in files]
     lines = list[str]()
     with counted("states", errors()) as on_count:
         if any(tables):
-            deciders = [_decider(options, file) for file in (one, other)]
+            deciders = [
+                find_table(file) if manager_of(file) else options.with_file(file).knowledge()
+                for file in files
+            ]
             base = both[tables.index(None) if None in tables else 0].knowledge()
             difference = compare_deciders(base, deciders, max_failed, on_count)
         else:
             before, after = (each.knowledge() for each in both)
             lines += _changed_axioms(*compare_axioms(before.base, after.base))
             difference = before.diff(after, max_failed, on_count)
-    missions = None
+    lines += difference.lines()
     if mission_options.missions is not None:
-        missions = _compared_missions(both, tables, mission_options)
-    print(*lines, *difference.lines(), sep="\n")
-    if missions is not None:
-        print()
-        print(shown(missions[0].table(difference)))
-        print(*missions[1], sep="\n")
+        missions, about = _compared_missions(both, tables, mission_options)
+        lines += ["", shown(missions.table(difference)), *about]
+    print(*lines, sep="\n")
 
 
 def _changed_axioms(removed: Sequence[str], added: Sequence[str]) -> Iterator[str]:
@@ -261,19 +254,6 @@ def _changed_axioms(removed: Sequence[str], added: Sequence[str]) -> Iterator[st
         yield f"axioms and rules: {len(removed)} removed, {len(added)} added"
     yield from (f"  - {text}" for text in removed)
     yield from (f"  + {text}" for text in added)
-
-
-def _side(options: ReasonerOptions, file: Path) -> ReasonerOptions:
-    """Return the options with what is compared; a decision table changes none."""
-    from suave_des.kb.decision_table import manager_of
-
-    return options if manager_of(file) else options.with_file(file)
-
-
-def _decider(options: ReasonerOptions, file: Path) -> KnowledgeBase | DecisionTable:
-    from suave_des.kb.decision_table import find_table, manager_of
-
-    return find_table(file) if manager_of(file) else options.with_file(file).knowledge()
 
 
 def _compared_missions(

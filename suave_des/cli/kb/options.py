@@ -8,10 +8,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from suave_des.cli.console import output
-from suave_des.cli.options import KnowledgeFiles, ReasonerOption
+from suave_des.cli.options import KnowledgeFiles, ReasonerOption, option
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
@@ -25,18 +23,11 @@ if TYPE_CHECKING:
 
 TimeLimitS = Annotated[
     float,
-    typer.Option(
-        "--time-limit", metavar="S", min=0.01, help="Time limit for each state, in s of CPU time."
-    ),
+    option("Time limit for each state, in s of CPU time.", "S", min=0.01),
 ]
 MaxFailed = Annotated[
     int,
-    typer.Option(
-        "--max-failed",
-        min=0,
-        metavar="N",
-        help="States with up to N components failed or recovered.",
-    ),
+    option("States with up to N components failed or recovered.", "N", min=0),
 ]
 
 
@@ -46,7 +37,7 @@ class KnowledgeOptions(KnowledgeFiles):
 
     scenario: Annotated[
         str,
-        typer.Option("--scenario", metavar="SCENARIO", help="Scenario with the knowledge base."),
+        option("Scenario with the knowledge base.", "SCENARIO"),
     ] = DEFAULT_SCENARIO
 
     def loaded(self) -> LoadedScenario:
@@ -83,11 +74,10 @@ class ReasonerOptions(KnowledgeOptions):
 
 At = Annotated[
     list[str] | None,
-    typer.Option(
-        "--at",
-        metavar="WHAT",
-        help="Part of the state: NAME=VALUE, a FUNCTION with an objective, a YAML file, or FOLDER@SECONDS of a "
+    option(
+        "Part of the state: NAME=VALUE, a FUNCTION with an objective, a YAML file, or FOLDER@SECONDS of a "
         "mission; repeatable.",
+        "WHAT",
     ),
 ]
 

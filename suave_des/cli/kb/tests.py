@@ -17,7 +17,7 @@ from rich.text import Text
 
 from suave_des.cli.console import counted, errors, output
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS, shown
-from suave_des.cli.options import KnowledgeFiles
+from suave_des.cli.options import KnowledgeFiles, argument, flag, option
 from suave_des.errors import InputError, number_of, unknown
 from suave_des.errors import shown as quoted
 from suave_des.files import check_output_file, write_files
@@ -26,7 +26,6 @@ from suave_des.resources import shipped_folder
 if TYPE_CHECKING:
     from suave_des.kb.knowledge_base import KnowledgeBase
     from suave_des.kb.rule_tests import RuleTest, Tested, TestResult
-    from suave_des.knowledge.state import KnowledgeState
 
     Suite = tuple[Tested, KnowledgeBase, list[RuleTest]]
 
@@ -41,9 +40,7 @@ class TestOptions(KnowledgeFiles):
 
     scenario: Annotated[
         str | None,
-        typer.Option(
-            "--scenario", metavar="SCENARIO", help="Scenario instead of the one that files name."
-        ),
+        option("Scenario instead of the one that files name.", "SCENARIO"),
     ] = None
     time_limit: TimeLimitS = 60.0
 
@@ -76,17 +73,15 @@ class MutationOptions:
 
     mutate: Annotated[
         bool,
-        typer.Option(
-            "--mutate", help="Make small mistakes in rules; report those that no test notices."
-        ),
+        flag("--mutate", "Make small mistakes in rules; report those that no test notices."),
     ] = False
     mutants: Annotated[
         int | None,
-        typer.Option("--mutants", min=1, metavar="N", help="Number of mutants; by default all."),
+        option("Number of mutants; by default all.", "N", min=1),
     ] = None
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule; repeatable."),
+        option("Only mutants of this rule; repeatable.", "NAME"),
     ] = None
     max_failed: MaxFailed = 1
 
@@ -101,32 +96,22 @@ def test(
     mutation: MutationOptions,
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE", help="Tests in YAML; by default those of the shipped rules."
-        ),
+        argument("Tests in YAML; by default those of the shipped rules.", "FILE"),
     ] = None,
     select: Annotated[
         str | None,
-        typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name."),
+        option("Only tests with this text in their name.", "TEXT", "-k"),
     ] = None,
     junit_xml: Annotated[
         Path | None,
-        typer.Option(
-            "--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML."
-        ),
+        option("Write the results as JUnit XML.", "FILE", "--junit-xml", "--junitxml"),
     ] = None,
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="Show what the tests cover.")
-    ] = False,
+    coverage: Annotated[bool, flag("--coverage", "Show what the tests cover.")] = False,
     from_mission: Annotated[
         Path | None,
-        typer.Option(
-            "--from-mission", metavar="DIR", help="Write a recorded mission's decisions as tests."
-        ),
+        option("Write a recorded mission's decisions as tests.", "DIR"),
     ] = None,
-    write: Annotated[
-        Path | None, typer.Option("--write", metavar="FILE", help="File for the tests.")
-    ] = None,
+    write: Annotated[Path | None, option("File for the tests.", "FILE")] = None,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
 
@@ -152,18 +137,16 @@ def test(
         from suave_des.kb.rule_tests import junit_xml as as_junit_xml
 
         write_files(junit_xml.parent, {junit_xml.name: as_junit_xml(results)})
-    _print_summary(console, results, time.perf_counter() - began)
+    all_passed = _print_summary(console, results, time.perf_counter() - began)
     if coverage:
         _cover(suites, mutation.max_failed, write)
-    all_passed = all(result.passed for result in results)
+    if all_passed:
+        _mutate(console, suites, mutation)
+        return
     if mutation.is_wanted:
-        if all_passed:
-            _mutate(console, suites, mutation)
-        else:
-            why = "every mutant would count as killed"
-            console.print(f"no mutation testing while a test fails: {why}")
-    if not all_passed:
-        raise typer.Exit(FAILED)
+        why = "every mutant would count as killed"
+        console.print(f"no mutation testing while a test fails: {why}")
+    raise typer.Exit(FAILED)
 
 
 def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> None:
@@ -248,8 +231,7 @@ def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
     for result in failed:
         console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"))
         console.print(_place(result.test.file, result.test.line))
-        for failure in result.failures:
-            first, *more = failure
+        for first, *more in result.failures:
             console.print(Text(first, "red"))
             if more:
                 console.print("\n".join(more))
@@ -259,7 +241,8 @@ def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
         console.print(f"FAILED {place}: {result.test.name}: {result.failures[0][0]}")
 
 
-def _print_summary(console: Console, results: Sequence[TestResult], duration_s: float) -> None:
+def _print_summary(console: Console, results: Sequence[TestResult], duration_s: float) -> bool:
+    """Print how many tests failed and passed; return whether all passed."""
     failed = sum(not result.passed for result in results)
     passed = len(results) - failed
     states = sum(len(result.test.situations) for result in results)
@@ -268,6 +251,7 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     console.print(
         Text(line.center(min(console.width, _WIDTH), "="), "bold red" if failed else "bold green")
     )
+    return not failed
 
 
 def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
@@ -287,9 +271,7 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
             found = measure_coverage(knowledge, situations, max_failed, on_count)
         print("", shown(found.table()).rstrip("\n"), *found.lines(), sep="\n")
         if file is not None and found.proposed:
-            states: list[tuple[str, KnowledgeState]] = [
-                (str(goals[0]), state) for state, goals in found.proposed
-            ]
+            states = [(str(goals[0]), state) for state, goals in found.proposed]
             text = tests_text(about, knowledge, states, "States that other tests do not cover.")
             write_files(file.parent, {file.name: text})
             print(f"{len(states)} tests are in {file}; read them before you keep them")
@@ -298,9 +280,10 @@ def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
 
 
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
+    """Make small mistakes in rules, if that is wanted, and print which the tests notice."""
     from suave_des.kb.adequacy import mutants_of, mutate, mutation_lines, mutation_table, sample
 
-    for _, knowledge, tests in suites:
+    for _, knowledge, tests in suites if options.is_wanted else ():
         found = mutants_of(knowledge.base)
         names = list(dict.fromkeys(mutant.name for mutant in found))
         for name in options.only or ():

@@ -14,11 +14,14 @@ async function startPlotly() {
 const DASHES = ['solid', 'dash', 'dot', 'dashdot', 'longdash'];
 const SYMBOLS = ['circle', 'square', 'diamond', 'triangle-up', 'cross', 'x'];
 const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'] };
-/** The look of a manager is the one that it has in figures. */
-const { looks } = DATA.results.drawn;
-const groupColour = (number) => colour(`--m${looks[number] % 6}`);
-const groupDash = (number) => DASHES[looks[number] % DASHES.length];
-const groupSymbol = (number) => SYMBOLS[looks[number] % SYMBOLS.length];
+const { groups, looks } = DATA.results.drawn;
+const tintOf = (number) => `--m${looks[number] % 6}`;
+
+/** The name and the look of a manager, which is the one that it has in figures. */
+const lookOf = (number) => ({
+  name: plain(groups[number]), color: colour(tintOf(number)),
+  dash: DASHES[looks[number] % DASHES.length], symbol: SYMBOLS[looks[number] % SYMBOLS.length],
+});
 
 /** Names may contain what Plotly would take for markup. */
 const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;').replace(/>/g, '&gt;').replace(/\$/g, '&#36;');
@@ -42,7 +45,7 @@ function show(id, traces, layout) {
   const place = byId(id);
   if (!traces.length) {
     if (place.classList.contains('js-plotly-plot')) Plotly.purge(place);
-    place.replaceChildren(element('div', { class: 'empty' }, 'nothing to show with this choice'));
+    place.replaceChildren(element('div.empty', 'nothing to show with this choice'));
     return;
   }
   if (place.firstChild?.className === 'empty') place.replaceChildren();

@@ -2,16 +2,23 @@
 
 const DATA = JSON.parse(document.getElementById('data').textContent);
 
-/** Make an element; texts are always text, never markup, whatever they contain. */
-function element(tag, attributes = {}, ...children) {
+/** Make an element such as 'p.quiet', of attributes, children and lists of them; null is left out. Texts are always text, never markup. */
+function element(name, ...parts) {
+  const [tag, ...classes] = name.split('.');
   const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name === 'class') made.className = value;
-    else if (name.startsWith('on')) made.addEventListener(name.slice(2), value);
-    else if (value !== undefined && value !== null) made.setAttribute(name, value);
+  made.className = classes.join(' ');
+  for (const part of parts.flat()) {
+    if (Object.getPrototypeOf(part ?? '') === Object.prototype) setAttributes(made, part);
+    else made.append(part ?? '');
   }
-  made.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== ''));
   return made;
+}
+
+function setAttributes(made, attributes) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith('on')) made[name] = value;
+    else if (value !== null) made.setAttribute(name, value);
+  }
 }
 
 const byId = (id) => document.getElementById(id);
@@ -39,7 +46,7 @@ function startTheme(button) {
   const chosen = () => stored('suave-des-theme') ?? (systemIsDark.matches ? 'dark' : 'light');
   setTheme(asked ?? chosen());
   systemIsDark.addEventListener('change', () => setTheme(chosen()));
-  button.addEventListener('click', toggleTheme);
+  button.onclick = toggleTheme;
 }
 function toggleTheme() {
   const theme = document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark';
@@ -62,10 +69,10 @@ function modeColours() {
 /** Buttons of which one is pressed. */
 function choice(parent, entries, chosen, onChoose) {
   const buttons = entries.map(([value, label, title]) => element('button', {
-    type: 'button', title, 'aria-pressed': String(value === chosen), onclick: () => choose(value),
+    type: 'button', title, 'aria-pressed': value === chosen, onclick: () => choose(value),
   }, label));
   function choose(value) {
-    entries.forEach(([each], index) => buttons[index].setAttribute('aria-pressed', String(each === value)));
+    entries.forEach(([each], index) => buttons[index].setAttribute('aria-pressed', each === value));
     onChoose(value);
   }
   parent.append(...buttons);

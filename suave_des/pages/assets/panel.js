@@ -4,20 +4,16 @@ const HELD_S = 9; // after this the panel shows what happened last as something 
 const STATUS = /^(fg_status|o_status|o_updatable|fd_realisability|c_status|fd_error_log)\((.*)\)$/;
 
 function makePanel(play) {
-  const phase = (name, title) => {
+  const phases = Object.fromEntries(['Monitor', 'Analyze', 'Plan', 'Execute', 'Knowledge'].map((title) => {
     const time = element('time');
     const body = element('div');
-    const box = element('section', { class: `phase ${name}` }, element('h3', {}, title, time), body);
-    return { box, body, time, show: (...children) => body.replaceChildren(...children.flat()) };
-  };
-  const phases = {
-    monitor: phase('monitor', 'Monitor'), analyze: phase('analyze', 'Analyze'), plan: phase('plan', 'Plan'),
-    execute: phase('execute', 'Execute'), knowledge: phase('knowledge', 'Knowledge'),
-  };
+    const name = title.toLowerCase();
+    return [name, { box: element(`section.phase.${name}`, element('h3', title, time), body), body, time }];
+  }));
   const { note } = play.mission.cycles;
-  const box = element('aside', { class: 'mind', 'aria-label': `MAPE-K of ${play.manager}` },
-    ...Object.values(phases).map((each) => each.box));
-  if (note) box.append(element('section', { class: 'phase' }, element('p', { class: 'note' }, note)));
+  const box = element('aside.mind', { 'aria-label': `MAPE-K of ${play.manager}` },
+    Object.values(phases).map((each) => each.box));
+  if (note) box.append(element('section.phase', element('p.note', note)));
   const gauges = new Map();
   const shown = {};
 
@@ -25,28 +21,29 @@ function makePanel(play) {
   function once(name, key, make) {
     if (shown[name] === key) return;
     shown[name] = key;
-    phases[name].show(...make());
+    phases[name].body.replaceChildren(...[make()].flat());
   }
 
   function update(moment) {
     const { cycles } = play.mission.cycles;
     const place = lastAt(cycles, moment.t, (each) => each.t_s);
-    const cycle = place < 0 ? null : cycles[place];
-    const event = lastOf(play.happenings, place);
+    const cycle = cycles[place];
+    const event = play.happenings.slice(0, place + 1).findLast((each) => each);
     showMonitor(moment, cycle);
     if (!cycles.length) showWithout(moment);
     else showReasoning(moment, cycle, event);
     showExecute(moment);
-    const age = (t) => (t === null || t === undefined ? Infinity : moment.t - t);
+    const age = (t = -Infinity) => moment.t - t;
     const done = play.requests[lastAt(play.requests, moment.t, (each) => each.t)];
-    phases.monitor.box.classList.toggle('active', age(cycle?.t_s) < 1 || age(lastTime(play.mission.thrusters, moment.t)) < 2);
-    phases.analyze.box.classList.toggle('active', event && age(event.t_s) < 2.5 && event.inferred >= 0);
-    phases.plan.box.classList.toggle('active', event && age(event.t_s) < 3);
+    const [reported] = play.mission.thrusters.findLast(([t]) => t <= moment.t + 1e-6) ?? [];
+    phases.monitor.box.classList.toggle('active', age(cycle?.t_s) < 1 || age(reported) < 2);
+    phases.analyze.box.classList.toggle('active', age(event?.t_s) < 2.5 && event.inferred >= 0);
+    phases.plan.box.classList.toggle('active', age(event?.t_s) < 3);
     phases.execute.box.classList.toggle('active', age(done?.t) < 2);
   }
 
   function showMonitor(moment, cycle) {
-    const measured = { ...(cycle?.measured ?? {}) };
+    const measured = { ...cycle?.measured };
     for (const [name, value] of Object.entries(moment.further)) if (typeof value === 'number') measured[name] = value;
     if (moment.visibility !== null) measured.water_visibility = moment.visibility;
     const names = Object.keys(measured);
@@ -57,11 +54,11 @@ function makePanel(play) {
         const isVisibility = name === 'water_visibility';
         const most = isVisibility ? play.top : Math.max(1, measured[name]);
         const ticks = isVisibility ? DATA.scenario.thresholds_m : [];
-        const gauge = { fill: element('div', { class: 'fill' }), text: element('b'), most, isVisibility };
+        const gauge = { fill: element('div.fill'), text: element('b'), most, isVisibility };
         gauges.set(name, gauge);
-        return element('div', { class: 'gauge' }, element('span', {}, name.replaceAll('_', ' ')),
-          element('div', { class: 'rail' }, gauge.fill, ...ticks.map((tick) => element('span', {
-            class: 'tick', style: `left:${(100 * tick) / most}%`, title: `${tick} m`,
+        return element('div.gauge', element('span', name.replaceAll('_', ' ')),
+          element('div.rail', gauge.fill, ticks.map((tick) => element('span.tick', {
+            style: `left:${(100 * tick) / most}%`, title: `${tick} m`,
           }))), gauge.text);
       });
       const failed = moment.thrusters.flatMap((works, number) => (works === false ? [number + 1] : []));
@@ -78,7 +75,7 @@ function makePanel(play) {
 
   function showReasoning(moment, cycle, event) {
     if (!cycle) {
-      for (const name of ['analyze', 'plan', 'knowledge']) once(name, 'none', () => [element('p', { class: 'quiet' }, 'no cycle yet')]);
+      for (const name of ['analyze', 'plan', 'knowledge']) once(name, 'none', () => element('p.quiet', 'no cycle yet'));
       return;
     }
     const show = event ?? cycle;
@@ -88,80 +85,80 @@ function makePanel(play) {
       phases[name].time.textContent = event ? `at ${show.t_s.toFixed(1)} s` : '';
     }
     const inferred = play.mission.cycles.inferences[show.inferred];
-    once('analyze', `${show.t_s}`, () => (inferred
-      ? inferred.facts.slice().sort((a, b) => weight(b) - weight(a)).map((fact) => showFact(fact, inferred.t_s, show.t_s))
-      : [element('p', { class: 'quiet' }, 'no rule adds anything: all objectives are met')]));
-    once('plan', `${show.t_s}`, () => (show.decided.length
-      ? show.decided.toSorted((a, b) => stays(a) - stays(b)).map(showDecision) : [element('p', { class: 'quiet' }, 'nothing calls for adaptation')]));
+    once('analyze', show.t_s, () => (inferred
+      ? inferred.facts.toSorted((a, b) => weight(b) - weight(a)).map((fact) => showFact(fact, inferred.t_s, show.t_s))
+      : element('p.quiet', 'no rule adds anything: all objectives are met')));
+    once('plan', show.t_s, () => (show.decided.length
+      ? show.decided.toSorted((a, b) => stays(a) - stays(b)).map(showDecision) : element('p.quiet', 'nothing calls for adaptation')));
     const rows = Object.entries(cycle.objectives).map(([name, status]) => [name, cycle.groundings[name] ?? 'not grounded', status]);
-    const parts = Object.entries(cycle.components).map(([name, status]) => [name, status]);
-    once('knowledge', JSON.stringify([rows, parts]), () => [element('div', { class: 'known' },
-      ...rows.flatMap(([name, design, status]) => [element('span', {}, name), element('span', {}, design),
+    const parts = Object.entries(cycle.components);
+    once('knowledge', JSON.stringify([rows, parts]), () => element('div.known',
+      rows.flatMap(([name, design, status]) => [element('span', name), element('span', design),
         element('span', { class: status ? 'error' : 'quiet' }, status ?? 'met')]),
-      ...parts.flatMap(([name, status]) => [element('span', {}, name),
-        element('span', { class: status === 'FALSE' ? 'error' : '' }, status), element('span')]))]);
+      parts.flatMap(([name, status]) => [element('span', name),
+        element('span', { class: status === 'FALSE' ? 'error' : '' }, status), element('span')])));
   }
 
   const weight = (fact) => (/^(o_status|fg_status)/.test(fact.fact) ? 2 : STATUS.test(fact.fact) ? 1 : 0);
 
   function showFact(fact, tracedAt, t) {
     const rule = play.mission.cycles.rules[fact.rule];
-    const told = element('div', { class: 'says' }, ...wordsOf(fact.fact));
     const by = fact.rule
-      ? [element('div', { class: 'by' }, 'by rule ', element('b', {}, fact.rule)),
-        element('div', { class: 'bindings' }, ...fact.bindings.map(([name, value]) => element('span', {}, `?${name} = ${value}`)))]
-      : [element('div', { class: 'by' }, 'by the schema of the ontology')];
-    const because = element('details', {}, element('summary', {}, rule ? 'rule and facts' : 'facts'),
-      rule ? element('div', { class: 'rule' }, rule) : null, ...fact.because.map(showStep),
-      tracedAt !== t ? element('p', {}, `numbers as at ${tracedAt.toFixed(1)} s, the first such cycle`) : null);
-    return element('div', { class: 'fact' }, told, ...by, because);
+      ? [element('div.by', 'by rule ', element('b', fact.rule)),
+        element('div.bindings', fact.bindings.map(([name, value]) => element('span', `?${name} = ${value}`)))]
+      : [element('div.by', 'by the schema of the ontology')];
+    const because = element('details', element('summary', rule ? 'rule and facts' : 'facts'),
+      rule ? element('div.rule', rule) : null, fact.because.map(showStep),
+      tracedAt !== t ? element('p', `numbers as at ${tracedAt.toFixed(1)} s, the first such cycle`) : null);
+    return element('div.fact', element('div.says', wordsOf(fact.fact)), by, because);
   }
 
   function showStep(step) {
     const how = { rule: `by rule ${step.rule}`, state: 'known', ontology: 'in the ontology', axioms: 'by the schema' }[step.source];
-    return element('div', { class: 'because' }, element('code', {}, step.fact), ` ${how}`, ...step.because.map(showStep));
+    return element('div.because', element('code', step.fact), ` ${how}`, step.because.map(showStep));
   }
 
   function wordsOf(fact) {
     const found = STATUS.exec(fact);
-    if (!found) return [element('code', {}, fact)];
+    if (!found) return [element('code', fact)];
     const [subject, value] = found[2].split(', ');
-    const plain = {
-      fg_status: ['grounding of ', subject.replace(/^fg_/, 'fd_'), ' is ', element('em', {}, value)],
-      o_status: ['objective of ', subject.replace(/^o_/, ''), ' is ', element('em', {}, value)],
-      o_updatable: ['objective of ', subject.replace(/^o_/, ''), ' is ', element('em', {}, value === 'true' ? 'updatable' : 'not updatable')],
-      fd_realisability: [subject, ' is ', element('em', {}, value === 'false' ? 'not realisable' : 'realisable')],
-      c_status: [subject, ' is ', element('em', {}, value)],
-      fd_error_log: [subject, ' has an error for ', element('em', {}, value)],
-    };
-    return plain[found[1]];
+    const objective = `objective of ${subject.replace(/^o_/, '')} is `;
+    const [words, answer = value] = {
+      fg_status: [`grounding of ${subject.replace(/^fg_/, 'fd_')} is `],
+      o_status: [objective],
+      o_updatable: [objective, value === 'true' ? 'updatable' : 'not updatable'],
+      fd_realisability: [`${subject} is `, value === 'false' ? 'not realisable' : 'realisable'],
+      c_status: [`${subject} is `],
+      fd_error_log: [`${subject} has an error for `],
+    }[found[1]];
+    return [words, element('em', answer)];
   }
 
   const stays = (decided) => Number(decided.chosen === decided.before);
 
   function showDecision(decided) {
     const answer = decided.chosen === null ? 'no design is left' : stays(decided) ? `${decided.chosen} stays` : null;
-    return element('div', { class: 'function' },
-      element('p', {}, `${decided.function}: `, answer ?? decided.reason.split(': ')[0]),
-      element('ul', { class: 'designs' }, ...decided.designs.map((design) => element('li', {
+    return element('div.function',
+      element('p', `${decided.function}: `, answer ?? decided.reason.split(': ')[0]),
+      element('ul.designs', decided.designs.map((design) => element('li', {
         class: { chosen: 'chosen', 'left out': 'out' }[design.verdict] ?? '',
-      }, element('span', { class: 'name' }, design.name), element('span', { class: 'why' },
+      }, element('span.name', design.name), element('span.why',
         design.verdict === 'left out' ? `left out: ${design.reason}` : `performance ${design.performance}${design.verdict === 'chosen' ? ', chosen' : ''}`)))));
   }
 
   function showWithout(moment) {
     const own = play.mission.events.filter(([, source]) => source === play.manager);
-    const until = lastAt(own, moment.t, (each) => each[0]);
+    const until = lastAt(own, moment.t, ([t]) => t);
     once('analyze', `own${until}`, () => (own.length
       ? own.slice(Math.max(0, until - (own[until]?.[2] === 'tick' ? 0 : 3)), until + 1).map(showOwn)
-      : [element('p', { class: 'quiet' }, `${play.manager} records no knowledge: its decisions are made in code`)]));
-    once('plan', 'own', () => [element('p', { class: 'quiet' }, 'see what it requests, below')]);
-    once('knowledge', 'own', () => [element('p', { class: 'quiet' }, 'no knowledge base')]);
+      : element('p.quiet', `${play.manager} records no knowledge: its decisions are made in code`)));
+    once('plan', 'own', () => element('p.quiet', 'see what it requests, below'));
+    once('knowledge', 'own', () => element('p.quiet', 'no knowledge base'));
   }
 
   function showOwn([t, , name, detail]) {
     const words = `${t.toFixed(1)} s  ${name.replaceAll('_', ' ')}`;
-    return name === 'tick' ? element('div', {}, element('p', { class: 'tick-time' }, words), ticked(detail)) : element('p', {}, `${words}: ${detail}`);
+    return name === 'tick' ? element('div', element('p.tick-time', words), ticked(detail)) : element('p', `${words}: ${detail}`);
   }
 
   /** A tick as a tree: its parts are separated by semicolons, and have those below them in brackets. */
@@ -173,7 +170,7 @@ function makePanel(play) {
       if (letter === ';' && depth === 0) parts.push('');
       else parts[parts.length - 1] += letter;
     }
-    return element('ul', { class: 'ticked' }, ...parts.map((part) => {
+    return element('ul.ticked', parts.map((part) => {
       const [, head, below] = /^(.*?) \((.*)\)$/.exec(part.trim()) ?? [null, part.trim(), null];
       return element('li', { class: / failure$/.test(head) ? 'failure' : '' }, head, below === null ? null : ticked(below));
     }));
@@ -182,29 +179,14 @@ function makePanel(play) {
   function showExecute(moment) {
     const until = lastAt(play.requests, moment.t, (each) => each.t);
     const recent = play.requests.slice(Math.max(0, until - 2), until + 1).reverse();
-    const key = recent.map((each) => [each.t, each.set !== null && each.set <= moment.t]).join();
-    once('execute', key || 'none', () => (recent.length ? recent.map((each) => {
-      const isSet = each.set !== null && each.set <= moment.t;
-      return element('p', {}, element('code', {}, `${each.function} → ${each.mode}`), ' ',
-        element('span', { class: 'quiet' }, `${each.t.toFixed(1)} s${isSet ? `, in effect ${each.set.toFixed(1)} s` : ', under way'}`));
-    }) : [element('p', { class: 'quiet' }, 'no mode requested yet')]));
+    const key = recent.map((each) => [each.t, each.set <= moment.t]).join();
+    once('execute', key, () => (recent.length ? recent.map(({ t, change, set }) => element('p', element('code', change), ' ',
+      element('span.quiet', `${t.toFixed(1)} s, ${set <= moment.t ? `in effect ${set.toFixed(1)} s` : 'under way'}`)))
+      : element('p.quiet', 'no mode requested yet')));
   }
 
   return { box, update };
 }
 
 /** Index of the last entry at or before a time, -1 if there is none. */
-function lastAt(entries, t, timeOf) {
-  let [low, high] = [0, entries.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (timeOf(entries[middle]) <= t + 1e-6) low = middle + 1;
-    else high = middle;
-  }
-  return low - 1;
-}
-const lastTime = (entries, t) => entries[lastAt(entries, t, (each) => each[0])]?.[0] ?? null;
-const lastOf = (happenings, place) => {
-  for (let n = place; n >= 0; n--) if (happenings[n]) return happenings[n];
-  return null;
-};
+const lastAt = (entries, t, timeOf) => entries.findLastIndex((each) => timeOf(each) <= t + 1e-6);

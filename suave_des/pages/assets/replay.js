@@ -9,32 +9,25 @@ const PRESETS = {
 };
 
 function prepare(mission) {
-  const { track: given } = mission;
-  const track = {
-    t: given.t_s, x: given.x_m, y: given.y_m, z: given.z_m, roll: given.roll_rad, pitch: given.pitch_rad,
-    yaw: given.yaw_rad, mode: given.mode, visibility: given.visibility_m,
-  };
-  const play = { mission, track, manager: String(mission.metrics.manager), duration: track.t.at(-1) };
+  const { track } = mission;
+  const play = { mission, track, manager: mission.metrics.manager, duration: track.t_s.at(-1) };
   const usual = ['t_s', 'x_m', 'y_m', 'z_m', 'roll_rad', 'pitch_rad', 'yaw_rad', 'mode', 'visibility_m'];
-  play.further = Object.keys(given).filter((name) => !usual.includes(name));
-  play.indexAt = (t) => Math.max(0, lastAt(track.t, t, (each) => each));
-  const measured = track.visibility.filter((each) => each !== null);
-  const clearest = measured.reduce((most, each) => Math.max(most, each), 0.1);
-  play.murkiest = measured.reduce((least, each) => Math.min(least, each), clearest);
-  play.clearest = clearest;
-  const highest = track.z.reduce((most, each) => Math.max(most, each), BED) - BED;
-  play.top = Math.max(1, clearest, highest) * 1.1;
+  play.further = Object.keys(track).filter((name) => !usual.includes(name));
+  play.indexAt = (t) => Math.max(0, lastAt(track.t_s, t, (each) => each));
+  const ends = (values) => values.reduce(([low, high], each) => [Math.min(low, each), Math.max(high, each)], [Infinity, -Infinity]);
+  const [murkiest, clearest] = ends(track.visibility_m.filter((each) => each !== null));
+  play.clearest = Math.max(0.1, clearest);
+  play.murkiest = Math.min(murkiest, play.clearest);
+  play.top = Math.max(1, play.clearest, ends(track.z_m)[1] - BED) * 1.1;
   play.swath = [];
-  for (let i = 0; i < track.t.length; i += 4) {
-    const altitude = track.z[i] - BED;
-    if (track.visibility[i] !== null && altitude <= track.visibility[i]) {
-      play.swath.push({ x: track.x[i], y: track.y[i], half: altitude * TANGENT, t: track.t[i] });
+  for (let i = 0; i < track.t_s.length; i += 4) {
+    const altitude = track.z_m[i] - BED;
+    if (track.visibility_m[i] !== null && altitude <= track.visibility_m[i]) {
+      play.swath.push({ x: track.x_m[i], y: track.y_m[i], half: altitude * TANGENT, t: track.t_s[i] });
     }
   }
-  const xs = [...track.x, ...PIPELINE.map((each) => each[0])];
-  const ys = [...track.y, ...PIPELINE.map((each) => each[1])];
-  const ends = (values) => values.reduce(([low, high], each) => [Math.min(low, each), Math.max(high, each)], [Infinity, -Infinity]);
-  const [[x0, x1], [y0, y1]] = [ends(xs), ends(ys)];
+  const [x0, x1] = ends([...track.x_m, ...PIPELINE.map((each) => each[0])]);
+  const [y0, y1] = ends([...track.y_m, ...PIPELINE.map((each) => each[1])]);
   play.bounds = { x0: x0 - 1, x1: x1 + 1, y0: y0 - 1, y1: y1 + 1 };
   const lengths = mission.way.map(([x, y]) => lengthAlong(x, y));
   let [from, to] = [Infinity, -Infinity];
@@ -51,12 +44,10 @@ function prepare(mission) {
   });
   play.requests = [];
   for (const [t, , event, detail] of mission.events) {
-    if (event === 'mode_requested') {
-      const [name, mode] = detail.split(' -> ');
-      play.requests.push({ t, function: name, mode, set: null });
-    } else if (event === 'mode_set') {
-      const [name, mode] = detail.split(' = ');
-      const open = play.requests.findLast((each) => each.function === name && each.mode === mode && each.set === null);
+    if (event === 'mode_requested') play.requests.push({ t, change: detail.replace(' -> ', ' → '), set: Infinity });
+    if (event === 'mode_set') {
+      const change = detail.replace(' = ', ' → ');
+      const open = play.requests.findLast((each) => each.change === change && each.set === Infinity);
       if (open) open.set = t;
     }
   }
@@ -88,7 +79,7 @@ function troublesOf({ mission, track, duration }) {
     for (const each of decided) note(`no design is left for ${each.function}`, t, each.chosen === null);
   }
   for (const text of [...open.keys()]) note(text, duration, false);
-  track.t.forEach((t, n) => note('the vehicle lies on the ground', t, track.z[n] - BED < GROUND_M, LYING_S));
+  track.t_s.forEach((t, n) => note('the vehicle lies on the ground', t, track.z_m[n] - BED < GROUND_M, LYING_S));
   note('the vehicle lies on the ground', duration, false, LYING_S);
   return found;
 }
@@ -97,15 +88,16 @@ function momentOf(play, asked) {
   const { track, mission } = play;
   const t = clamp(asked, 0, play.duration);
   const index = play.indexAt(t);
-  const next = Math.min(index + 1, track.t.length - 1);
-  const share = next > index ? clamp((t - track.t[index]) / (track.t[next] - track.t[index]), 0, 1) : 0;
+  const next = Math.min(index + 1, track.t_s.length - 1);
+  const share = next > index ? clamp((t - track.t_s[index]) / (track.t_s[next] - track.t_s[index]), 0, 1) : 0;
   const between = (values) => mix(values[index], values[next], share);
-  const turn = Math.atan2(Math.sin(track.yaw[next] - track.yaw[index]), Math.cos(track.yaw[next] - track.yaw[index]));
+  const turned = track.yaw_rad[next] - track.yaw_rad[index];
+  const turn = Math.atan2(Math.sin(turned), Math.cos(turned));
   const pose = {
-    x: between(track.x), y: between(track.y), z: between(track.z),
-    roll: between(track.roll), pitch: between(track.pitch), yaw: track.yaw[index] + share * turn,
+    x: between(track.x_m), y: between(track.y_m), z: between(track.z_m),
+    roll: between(track.roll_rad), pitch: between(track.pitch_rad), yaw: track.yaw_rad[index] + share * turn,
   };
-  const visibility = track.visibility[index];
+  const visibility = track.visibility_m[index];
   const altitude = Math.max(0, pose.z - BED);
   const thrusters = Array(DATA.scenario.thrusters).fill(null);
   for (const [time, number, works] of mission.thrusters) if (time <= t) thrusters[number - 1] = works;
@@ -124,42 +116,41 @@ function momentOf(play, asked) {
 }
 
 function makePane(play) {
-  const canvas = (name, label) => element('canvas', { class: name, role: 'img', 'aria-label': label });
+  const canvas = (name, label) => element(`canvas.${name}`, { role: 'img', 'aria-label': label });
   const parts = {
     scene: canvas('scene', `The vehicle of ${play.manager} over the sea bed`), map: canvas('map', 'The mission from above'),
-    side: canvas('profile', 'The vehicle from the side'), state: element('div', { class: 'state' }),
-    altitude: element('b'), visibility: element('b'), mode: element('span', { class: 'mode' }),
-    distance: element('b'), lamps: element('span', { class: 'lamps' }), seeing: element('span', { class: 'figure' }),
+    side: canvas('profile', 'The vehicle from the side'), state: element('div.state'),
+    altitude: element('b'), visibility: element('b'), mode: element('span.mode'),
+    distance: element('b'), lamps: element('span.lamps'),
   };
-  for (let n = 1; n <= DATA.scenario.thrusters; n++) parts.lamps.append(element('i', { title: `thruster ${n}` }, String(n)));
-  const figure = (label, ...values) => element('span', { class: 'figure' }, element('small', {}, label), ...values);
-  parts.seeing.append(element('small', {}, 'visibility'), parts.visibility);
-  const stage = element('div', { class: 'stage' }, parts.scene, parts.map,
-    element('div', { class: 'hud top' }, element('div', { class: 'manager' }, play.manager), parts.state),
-    element('div', { class: 'hud bottom' }, figure('altitude', parts.altitude), parts.seeing,
+  for (let n = 1; n <= DATA.scenario.thrusters; n++) parts.lamps.append(element('i', { title: `thruster ${n}` }, n));
+  const figure = (label, value) => element('span.figure', element('small', label), value);
+  const stage = element('div.stage', parts.scene, parts.map,
+    element('div.hud.top', element('div.manager', play.manager), parts.state),
+    element('div.hud.bottom', figure('altitude', parts.altitude), figure('visibility', parts.visibility),
       figure('inspected', parts.distance), figure('thrusters', parts.lamps), figure('mode', parts.mode)));
   parts.mode.parentElement.classList.add('word');
   const panel = makePanel(play);
-  const box = element('article', { class: 'pane', 'aria-label': play.mission.name },
-    element('div', { class: 'world' }, stage, element('div', { class: 'side' }, parts.side)), panel.box);
+  const box = element('article.pane', { 'aria-label': play.mission.name },
+    element('div.world', stage, element('div.side', parts.side)), panel.box);
   lookAround(stage, play);
   return { play, box, parts, panel };
 }
 
 function lookAround(stage, play) {
   let from = null;
-  stage.addEventListener('pointerdown', (event) => {
+  stage.onpointerdown = (event) => {
     from = [event.clientX, event.clientY];
     stage.setPointerCapture(event.pointerId);
-  });
-  stage.addEventListener('pointermove', (event) => {
+  };
+  stage.onpointermove = (event) => {
     if (!from) return;
     play.view.azimuth -= (event.clientX - from[0]) * 0.007;
     play.view.pitch = clamp(play.view.pitch + (event.clientY - from[1]) * 0.006, 0.04, 1.5);
     from = [event.clientX, event.clientY];
     requestDraw();
-  });
-  for (const end of ['pointerup', 'pointercancel']) stage.addEventListener(end, () => { from = null; });
+  };
+  stage.onpointerup = stage.onpointercancel = () => { from = null; };
   stage.addEventListener('wheel', (event) => {
     event.preventDefault();
     play.view.distance = clamp(play.view.distance * Math.exp(event.deltaY * 0.001), 2.5, 40);
@@ -178,7 +169,7 @@ function drawPane({ play, box, parts, panel }, t) {
   }
   parts.altitude.textContent = `${moment.altitude.toFixed(1)} m`;
   parts.visibility.textContent = moment.visibility === null ? '–' : `${moment.visibility.toFixed(1)} m`;
-  parts.seeing.classList.toggle('blind', moment.visibility !== null && !moment.sees);
+  parts.visibility.classList.toggle('blind', moment.visibility !== null && !moment.sees);
   parts.distance.textContent = `${moment.distance.toFixed(1)} m`;
   parts.mode.replaceChildren(element('i'), moment.mode || 'no mode yet');
   parts.mode.firstChild.style.color = seaColour(moment.mode);
@@ -198,7 +189,7 @@ const span = Math.max(...plays.map((play) => play.duration));
 const state = { t: 0, speed: 4, isPlaying: false, drawnAt: null, requested: false };
 let modeColour = null;
 
-byId('panes').dataset.count = String(panes.length);
+byId('panes').className = panes.length > 1 ? 'two' : 'one';
 byId('panes').append(...panes.map((pane) => pane.box));
 describe();
 
@@ -224,9 +215,9 @@ function draw() {
   const surface = fitted(byId('timeline'), plays.length > 1 ? 104 : 84);
   modeColour ??= modeColours();
   if (surface) drawTimeline(surface, plays, state.t, span, modeColour);
-  byId('clock').replaceChildren(`${state.t.toFixed(1)} s`, element('small', {}, ` of ${span.toFixed(0)} s`));
+  byId('clock').replaceChildren(`${state.t.toFixed(1)} s`, element('small', ` of ${span.toFixed(0)} s`));
   const scrub = byId('scrub');
-  scrub.value = String(state.t);
+  scrub.value = state.t;
   scrub.setAttribute('aria-valuetext', `${state.t.toFixed(1)} seconds`);
   document.body.dataset.time = state.t.toFixed(2);
 }
@@ -277,7 +268,7 @@ const chooseSpeed = choice(byId('speeds'), SPEEDS.map((each) => [each, `${each}�
 
 function enlarge() {
   const isLarge = document.documentElement.classList.toggle('large');
-  byId('large').setAttribute('aria-pressed', String(isLarge));
+  byId('large').setAttribute('aria-pressed', isLarge);
   requestDraw();
 }
 
@@ -302,14 +293,14 @@ addEventListener('keydown', (event) => {
   event.preventDefault();
   action(event);
 });
-byId('play').addEventListener('click', () => setPlaying(!state.isPlaying));
-byId('play').addEventListener('keyup', (event) => { if (event.key === ' ') event.preventDefault(); });
-byId('before').addEventListener('click', () => goTo(nextStop(state.t, -1)));
-byId('after').addEventListener('click', () => goTo(nextStop(state.t, 1)));
-byId('large').addEventListener('click', enlarge);
-byId('help-button').addEventListener('click', () => byId('help').showModal());
-byId('scrub').max = String(span);
-byId('scrub').addEventListener('input', (event) => goTo(Number(event.target.value)));
+byId('play').onclick = KEYS.k;
+byId('play').onkeyup = (event) => { if (event.key === ' ') event.preventDefault(); };
+byId('before').onclick = KEYS.p;
+byId('after').onclick = KEYS.n;
+byId('large').onclick = enlarge;
+byId('help-button').onclick = KEYS['?'];
+byId('scrub').max = span;
+byId('scrub').oninput = (event) => goTo(Number(event.target.value));
 addEventListener('resize', requestDraw);
 themeListeners.push(() => { modeColour = null; showLegend(byId('legend'), plays); requestDraw(); });
 startTheme(byId('theme'));

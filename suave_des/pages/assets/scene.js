@@ -32,10 +32,13 @@ for (let i = 1, length = 0; i < PIPELINE.length; i++) {
 }
 const PIPE_RADIUS = 0.14;
 
-function strokeLine(d, [x0, y0], [x1, y1]) {
+function tracePath(d, ...points) {
   d.beginPath();
-  d.moveTo(x0, y0);
-  d.lineTo(x1, y1);
+  for (const [x, y] of points) d.lineTo(x, y);
+}
+
+function strokeLine(d, from, to) {
+  tracePath(d, from, to);
   d.stroke();
 }
 
@@ -60,7 +63,7 @@ function drawGlow(d, [x, y], size, inner, outer) {
 
 function drawScene(surface, play, moment, view) {
   const { drawing: d, width, height } = surface;
-  const { pose, clarity } = moment;
+  const { clarity } = moment;
   const water = Object.fromEntries(Object.keys(CLEAR).map((key) => [key, mixed(MURKY[key], CLEAR[key], clarity)]));
   const reach = 7 + 17 * clarity; // how far the spectator sees, in m
   const camera = new Camera(view.azimuth, view.pitch, view.distance, view.target, width, height);
@@ -74,7 +77,7 @@ function drawScene(surface, play, moment, view) {
   drawWay(c);
   drawShadow(c);
   drawFootprint(c);
-  drawVehicle(c, pose);
+  drawVehicle(c);
   drawSnow(c);
   drawMurk(c);
 }
@@ -97,11 +100,7 @@ function drawWater({ d, camera, width, height, water, moment }) {
     const broad = width * (0.03 + 0.03 * hash(n, 3));
     const brightest = rgb([150, 230, 235], 0.13 + 0.05 * Math.sin(moment.t * 0.4 + n));
     d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, height * 0.8), [0, brightest], [1, rgb([150, 230, 235], 0)]);
-    d.beginPath();
-    d.moveTo(x, 0);
-    d.lineTo(x + broad, 0);
-    d.lineTo(x + broad * 2.6 + width * 0.1, height * 0.8);
-    d.lineTo(x + width * 0.06, height * 0.8);
+    tracePath(d, [x, 0], [x + broad, 0], [x + broad * 2.6 + width * 0.1, height * 0.8], [x + width * 0.06, height * 0.8]);
     d.fill();
   }
   d.globalCompositeOperation = 'source-over';
@@ -224,10 +223,10 @@ function drawWay({ d, camera, fog, play, moment }) {
   let last = null;
   for (let i = 0; i <= moment.index + 3; i += 3) {
     const isEnd = i > moment.index;
-    const [x, y, z] = isEnd ? [moment.pose.x, moment.pose.y, moment.pose.z] : [track.x[i], track.y[i], track.z[i]];
+    const [x, y, z] = isEnd ? [moment.pose.x, moment.pose.y, moment.pose.z] : [track.x_m[i], track.y_m[i], track.z_m[i]];
     const at = camera.project(x, y, z);
     if (at && last) {
-      const age = moment.t - track.t[Math.min(i, moment.index)];
+      const age = moment.t - track.t_s[Math.min(i, moment.index)];
       const alpha = fog(at[2]) * (0.3 + 0.7 * Math.exp(-age / 45));
       if (alpha > 0.04) {
         d.globalAlpha = alpha;
@@ -296,15 +295,15 @@ function drawFootprint({ d, camera, moment }) {
   }
 }
 
-function drawVehicle({ d, camera, moment, water, clarity }, pose) {
-  const { turn, place } = bodyToWorld(pose, VEHICLE_SCALE);
+function drawVehicle({ d, camera, moment, water, clarity }) {
+  const { turn, place } = bodyToWorld(moment.pose, VEHICLE_SCALE);
   const shapes = [];
   for (const face of HULL) {
     const normal = turn(face.normal);
     const points = face.points.map(place);
     const centre = points[0].map((_, axis) => points.reduce((sum, point) => sum + point[axis], 0) / 4);
     const towards = centre.map((value, axis) => camera.eye[axis] - value);
-    if (normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2] <= 0) continue;
+    if (dot(normal, towards) <= 0) continue;
     const tint = mixed(face.tint, water.far, 0.1 + 0.12 * (1 - clarity));
     shapes.push({ depth: Math.hypot(...towards), draw: () => {
       d.beginPath();
@@ -380,7 +379,8 @@ function drawSnow({ d, camera, view, moment, clarity }) {
 }
 
 function drawMurk({ d, width, height, water, clarity, camera, moment }) {
-  const at = camera.project(moment.pose.x, moment.pose.y, moment.pose.z) ?? [width / 2, height / 2];
+  const { pose } = moment;
+  const at = camera.project(pose.x, pose.y, pose.z) ?? [width / 2, height / 2];
   d.fillStyle = withStops(
     d.createRadialGradient(at[0], at[1], height * 0.12, at[0], at[1], Math.max(width, height) * 0.75),
     [0, rgb(water.far, 0.02 + 0.1 * (1 - clarity))],

@@ -7,6 +7,8 @@ function hash(i, j, k = 0) {
   return ((n ^ (n >>> 16)) >>> 0) / 4294967296;
 }
 
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
 /** A camera that looks at a target. */
 class Camera {
   constructor(azimuth, pitch, distance, target, width, height) {
@@ -22,13 +24,13 @@ class Camera {
 
   /** Screen x and y, and depth; null for what is behind the camera. */
   project(x, y, z) {
-    const [dx, dy, dz] = [x - this.eye[0], y - this.eye[1], z - this.eye[2]];
-    const depth = dx * this.forward[0] + dy * this.forward[1] + dz * this.forward[2];
+    const offset = [x - this.eye[0], y - this.eye[1], z - this.eye[2]];
+    const depth = dot(offset, this.forward);
     if (depth < 0.25) return null;
     const scale = this.focus / depth;
     return [
-      this.width / 2 + scale * (dx * this.right[0] + dy * this.right[1]),
-      this.middle - scale * (dx * this.up[0] + dy * this.up[1] + dz * this.up[2]),
+      this.width / 2 + scale * dot(offset, this.right),
+      this.middle - scale * dot(offset, this.up),
       depth,
       scale,
     ];
@@ -79,7 +81,7 @@ function bodyToWorld(pose, scale) {
     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
     [-sp, cp * sr, cp * cr],
   ];
-  const turn = (v) => rows.map((row) => row[0] * v[0] + row[1] * v[1] + row[2] * v[2]);
+  const turn = (v) => rows.map((row) => dot(row, v));
   const place = (v) => {
     const [x, y, z] = turn(v);
     return [pose.x + scale * x, pose.y + scale * y, pose.z + scale * z];
@@ -89,6 +91,6 @@ function bodyToWorld(pose, scale) {
 
 const LIGHT = [-0.28, 0.22, 0.93];
 const shade = (tint, normal, light = 1) => {
-  const lit = 0.42 + 0.58 * Math.max(0, normal[0] * LIGHT[0] + normal[1] * LIGHT[1] + normal[2] * LIGHT[2]);
+  const lit = 0.42 + 0.58 * Math.max(0, dot(normal, LIGHT));
   return `rgb(${tint.map((value) => Math.round(Math.min(255, value * lit * light))).join(',')})`;
 };

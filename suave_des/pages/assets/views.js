@@ -15,13 +15,10 @@ function lengthAlong(x, y) {
 /** The whole mission from above. */
 function drawMap({ drawing: d, width, height }, play, moment) {
   d.clearRect(0, 0, width, height);
-  const { bounds, track } = play;
+  const { bounds: { x0, x1, y0, y1 }, track } = play;
   const margin = 11;
-  const scale = Math.min((width - 2 * margin) / (bounds.x1 - bounds.x0), (height - 2 * margin) / (bounds.y1 - bounds.y0));
-  const at = (x, y) => [
-    width / 2 + (x - (bounds.x0 + bounds.x1) / 2) * scale,
-    height / 2 - (y - (bounds.y0 + bounds.y1) / 2) * scale,
-  ];
+  const scale = Math.min((width - 2 * margin) / (x1 - x0), (height - 2 * margin) / (y1 - y0));
+  const at = (x, y) => [width / 2 + (x - (x0 + x1) / 2) * scale, height / 2 - (y - (y0 + y1) / 2) * scale];
   d.fillStyle = 'rgba(190,246,255,0.16)';
   d.beginPath();
   for (const { x, y, half, t } of play.swath) {
@@ -37,15 +34,15 @@ function drawMap({ drawing: d, width, height }, play, moment) {
     d.beginPath();
     for (const piece of PIECES) {
       if (seen && !isInspected(piece, moment)) continue;
-      d.moveTo(...at(piece.from[0], piece.from[1]));
-      d.lineTo(...at(piece.to[0], piece.to[1]));
+      d.moveTo(...at(...piece.from));
+      d.lineTo(...at(...piece.to));
     }
     d.stroke();
   }
   d.lineWidth = 1.3;
   for (let i = 4; i <= moment.index; i += 4) {
     d.strokeStyle = seaColour(track.mode[i]);
-    strokeLine(d, at(track.x[i - 4], track.y[i - 4]), at(track.x[i], track.y[i]));
+    strokeLine(d, at(track.x_m[i - 4], track.y_m[i - 4]), at(track.x_m[i], track.y_m[i]));
   }
   const { pose, altitude } = moment;
   const [x, y] = at(pose.x, pose.y);
@@ -54,10 +51,8 @@ function drawMap({ drawing: d, width, height }, play, moment) {
   d.lineWidth = 1;
   d.strokeRect(x - half, y - half, 2 * half, 2 * half);
   d.fillStyle = '#fff';
-  d.beginPath();
-  for (const [turn, far] of [[0, 6], [2.5, 4.6], [-2.5, 4.6]]) {
-    d.lineTo(x + far * Math.cos(pose.yaw + turn), y - far * Math.sin(pose.yaw + turn));
-  }
+  const corner = (turn, far) => [x + far * Math.cos(pose.yaw + turn), y - far * Math.sin(pose.yaw + turn)];
+  tracePath(d, corner(0, 6), corner(2.5, 4.6), corner(-2.5, 4.6));
   d.fill();
   d.font = '10px system-ui, sans-serif';
   d.fillStyle = '#eafaff';
@@ -80,14 +75,13 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, floor), [0, '#0e5a73'], [1, '#0b4156']);
   d.fillRect(0, 0, width, floor);
   const first = Math.max(0, play.indexAt(moment.t - before) - 1);
-  const last = Math.min(track.t.length - 1, play.indexAt(moment.t + after) + 1);
+  const last = Math.min(track.t_s.length - 1, play.indexAt(moment.t + after) + 1);
   d.beginPath(); // where the water hides the sea bed
-  d.moveTo(across(track.t[first]), 0);
+  d.moveTo(across(track.t_s[first]), 0);
   for (let i = first; i <= last; i++) {
-    const limit = track.visibility[i];
-    d.lineTo(across(track.t[i]), limit === null ? up(play.top) : up(limit));
+    d.lineTo(across(track.t_s[i]), up(track.visibility_m[i] ?? play.top));
   }
-  d.lineTo(across(track.t[last]), 0);
+  d.lineTo(across(track.t_s[last]), 0);
   d.closePath();
   d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, floor), [0, 'rgba(96,112,84,0.95)'], [1, 'rgba(96,112,84,0.72)']);
   d.fill();
@@ -106,17 +100,15 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   d.lineCap = 'round';
   for (let i = first + 1; i <= moment.index; i++) {
     d.strokeStyle = seaColour(track.mode[i]);
-    strokeLine(d, [across(track.t[i - 1]), up(track.z[i - 1] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
+    strokeLine(d, [across(track.t_s[i - 1]), up(track.z_m[i - 1] - BED)], [across(track.t_s[i]), up(track.z_m[i] - BED)]);
   }
   const { altitude, visibility, sees } = moment;
   const [x, y] = [across(moment.t), up(altitude)];
   const deep = sees || visibility === null ? altitude : visibility;
   d.fillStyle = withStops(d.createLinearGradient(0, y, 0, up(altitude - deep) + 1),
     [0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)'], [1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)']);
-  d.beginPath();
-  d.moveTo(x, y);
-  d.lineTo(x - deep * TANGENT * metre, up(altitude - deep));
-  d.lineTo(x + deep * TANGENT * metre, up(altitude - deep));
+  const [half, foot] = [deep * TANGENT * metre, up(altitude - deep)];
+  tracePath(d, [x, y], [x - half, foot], [x + half, foot]);
   d.fill();
   d.fillStyle = sees ? '#fff3c0' : '#ff9c7a';
   d.fillRect(x - altitude * TANGENT * metre, floor - 1.5, 2 * altitude * TANGENT * metre, 3);
@@ -145,46 +137,35 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   }
 }
 
-/** Marks of the timeline: corners around their middle, 4 pixels away; none for a disc. They differ without colour, too. */
+/** Marks of the timeline: SVG paths around their middle. They differ without colour, too. */
 const MARKS = {
-  adaptation: { colour: '--ink', corners: [[0, 0.75], [-1, -1], [1, -1]], words: 'adaptation' },
-  failure: { colour: '--bad', corners: [[0, -1.25], [1.25, 0], [0, 1.25], [-1.25, 0]], words: 'thruster fails' },
-  trouble: { colour: '--warm', corners: [[-1, -1], [1, -1], [1, 1], [-1, 1]], words: 'no design left, or on the ground' },
-  seen: { colour: '--good', corners: null, words: 'pipeline found' },
+  adaptation: { colour: '--ink', path: 'M0 3 -4-4H4Z', words: 'adaptation' },
+  failure: { colour: '--bad', path: 'M0-5 5 0 0 5-5 0Z', words: 'thruster fails' },
+  trouble: { colour: '--warm', path: 'M-4-4H4V4H-4Z', words: 'no design left, or on the ground' },
+  seen: { colour: '--good', path: 'M-4 0A4 4 0 0 1 4 0 4 4 0 0 1-4 0Z', words: 'pipeline found' },
 };
-
-function drawMark(d, kind, x, y) {
-  const { corners } = MARKS[kind];
-  d.beginPath();
-  if (corners) for (const [across, down] of corners) d.lineTo(x + 4 * across, y + 4 * down);
-  else d.arc(x, y, 4, 0, 7);
-  d.fill();
-}
 
 /** What the lines and marks of the timeline mean, of those that are in it. */
 function showLegend(box, plays) {
-  const drawn = (...shapes) => {
-    const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
-    svg.setAttribute('viewBox', '0 0 16 11');
-    for (const [kind, attributes] of shapes) {
-      const shape = document.createElementNS('http://www.w3.org/2000/svg', kind);
-      for (const [name, value] of Object.entries(attributes)) shape.setAttribute(name, value);
-      svg.append(shape);
-    }
-    return svg;
+  const drawn = (kind, attributes) => {
+    const made = document.createElementNS('http://www.w3.org/2000/svg', kind);
+    setAttributes(made, attributes);
+    return made;
   };
-  const entry = (words, ...shapes) => element('span', {}, drawn(...shapes), words);
-  const line = (mode) => ['path', { d: 'M0 6H16', stroke: modeColours()(mode), 'stroke-width': 3 }];
+  const entry = (words, kind, attributes) => {
+    const svg = drawn('svg', { viewBox: '0 0 16 11' });
+    svg.append(drawn(kind, attributes));
+    return element('span', svg, words);
+  };
   const kinds = Object.keys(MARKS).filter((kind) => plays.some((play) => play.marks.some((mark) => mark.kind === kind)));
   const modes = [...new Set(plays.flatMap((play) => play.track.mode))].filter((mode) => mode);
   box.replaceChildren(
     ...kinds.map((kind) => {
-      const { colour: name, corners, words } = MARKS[kind];
-      const points = corners?.map(([across, down]) => `${8 + 4 * across},${5.5 + 4 * down}`).join(' ');
-      return entry(words, corners ? ['polygon', { points, fill: colour(name) }] : ['circle', { cx: 8, cy: 5.5, r: 4, fill: colour(name) }]);
+      const { colour: name, path, words } = MARKS[kind];
+      return entry(words, 'path', { d: path, transform: 'translate(8 5.5)', fill: colour(name) });
     }),
-    entry('visibility', ['rect', { y: 2, width: 16, height: 8, fill: colour('--line') }]),
-    element('span', {}, 'altitude in'), ...modes.map((mode) => entry(mode, line(mode))),
+    entry('visibility', 'rect', { y: 2, width: 16, height: 8, fill: colour('--line') }),
+    element('span', 'altitude in'), ...modes.map((mode) => entry(mode, 'path', { d: 'M0 6H16', stroke: modeColours()(mode), 'stroke-width': 3 })),
   );
 }
 
@@ -205,24 +186,26 @@ function drawTimeline(surface, plays, t, span, modeColour) {
     d.globalAlpha = 0.62;
     d.beginPath();
     d.moveTo(0, bottom);
-    for (let i = 0; i < track.t.length; i += 4) d.lineTo(across(track.t[i]), up(track.visibility[i] ?? 0));
-    d.lineTo(across(track.t.at(-1)), bottom);
+    for (let i = 0; i < track.t_s.length; i += 4) d.lineTo(across(track.t_s[i]), up(track.visibility_m[i] ?? 0));
+    d.lineTo(across(track.t_s.at(-1)), bottom);
     d.fill();
     d.globalAlpha = 1;
-    for (let i = 4; i < track.t.length; i += 4) {
+    for (let i = 4; i < track.t_s.length; i += 4) {
       d.strokeStyle = isWordless ? colour('--soft') : modeColour(track.mode[i]);
-      d.globalAlpha = track.t[i] <= t ? 1 : isWordless ? 0 : 0.42;
+      d.globalAlpha = track.t_s[i] <= t ? 1 : isWordless ? 0 : 0.42;
       d.lineWidth = 1.9;
-      strokeLine(d, [across(track.t[i - 4]), up(track.z[i - 4] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
+      strokeLine(d, [across(track.t_s[i - 4]), up(track.z_m[i - 4] - BED)], [across(track.t_s[i]), up(track.z_m[i] - BED)]);
       if (isWordless) continue;
       d.fillStyle = modeColour(track.mode[i]);
-      d.fillRect(across(track.t[i - 4]), bottom + 1.5, across(track.t[i]) - across(track.t[i - 4]) + 0.4, 3);
+      d.fillRect(across(track.t_s[i - 4]), bottom + 1.5, across(track.t_s[i]) - across(track.t_s[i - 4]) + 0.4, 3);
     }
     d.globalAlpha = 1;
     for (const mark of isWordless ? [] : play.marks) {
       const x = across(mark.t);
       d.fillStyle = colour(MARKS[mark.kind].colour);
-      drawMark(d, mark.kind, x, top - 5);
+      d.translate(x, top - 5);
+      d.fill(new Path2D(MARKS[mark.kind].path));
+      d.translate(-x, 5 - top);
       if (mark.kind !== 'adaptation') d.fillRect(x - 0.5, top - 4, 1, bottom - top + 4);
     }
     if (plays.length > 1) {
