@@ -11,7 +11,7 @@ import yaml
 
 from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.exemplar.configurations import EXTENDED, TREES, at, import_config
+from suave_des.exemplar.configurations import import_config
 from suave_des.exemplar.files import EVENTS, PARAMETERS
 from suave_des.exemplar.keys import (
     DRAWN,
@@ -24,6 +24,8 @@ from suave_des.exemplar.keys import (
     is_since,
     read_by,
 )
+from suave_des.exemplar.mission_values import at
+from suave_des.exemplar.runner import EXTENDED, TREES
 from suave_des.files import Json
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.models import ThrusterEvent, mean

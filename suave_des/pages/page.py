@@ -50,10 +50,8 @@ def page(
     The scripts share one scope, in their order; `library` is compressed, and runs before what needs
     it.
     """
-    if library:  # which is a blob once it is expanded
-        script_sources = "'unsafe-inline' blob:"
-    else:
-        script_sources = "'unsafe-inline'"
+    # An expanded library is a blob.
+    script_sources = "'unsafe-inline' blob:" if library else "'unsafe-inline'"
     return Template(asset("page.html")).substitute(
         script_sources=script_sources,
         title=html.escape(title),
