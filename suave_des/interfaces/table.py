@@ -27,8 +27,8 @@ from suave_des.domain import (
 )
 from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.kb.decision_table import SHIPPED, DecisionTable, read_table
+from suave_des.kb.reports import Reports, component_reports
 from suave_des.kb.scale import Scale
-from suave_des.kb.space import Reports, component_reports
 from suave_des.knowledge.state import (
     NONE_LEFT,
     STAYS,

@@ -539,7 +539,7 @@ def mutate(
         return list(results.values()), 0
     space = knowledge.space
     for mutant in left:  # which may depend on more than the original does
-        space = space.common(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
+        space = space.union(PolicySpace.of(mutant.applied(knowledge.base), knowledge.settings))
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
     of_tests = dict.fromkeys(chain.from_iterable(test.situations for test in tests))
     situations = [*of_tests, *map(Situation, states)]

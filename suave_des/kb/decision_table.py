@@ -21,9 +21,10 @@ from typing import Literal, NamedTuple
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, did_you_mean, line_error, located, shown
 from suave_des.files import decode, read_bytes
+from suave_des.kb.reports import Reports
 from suave_des.kb.scale import Scale, TestedRegion, parse_region
 from suave_des.kb.situations import INCONSISTENT, Outcome, Situation
-from suave_des.kb.space import PolicySpace, Reports, present
+from suave_des.kb.space import PolicySpace, present
 from suave_des.kb.states import LASTING
 from suave_des.knowledge.reasoner import Regions
 from suave_des.knowledge.state import (

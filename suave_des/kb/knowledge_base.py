@@ -16,12 +16,13 @@ from rdflib.namespace import RDFS
 
 from suave_des.arguments import plain_arguments
 from suave_des.errors import InputError, nearest
+from suave_des.kb.deciding import decide_all
 from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.explain import Explainer, Explanation
 from suave_des.kb.matching import tracing_pellet
 from suave_des.kb.policy import Policy, make_policy
 from suave_des.kb.situations import OnCount, Outcome, Situation
-from suave_des.kb.space import PolicySpace, States, decide_all
+from suave_des.kb.space import PolicySpace, States
 from suave_des.kb.states import ManagingSettings, StateBuilder
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit, reasoning_on
@@ -322,7 +323,7 @@ class KnowledgeBase:
             KnowledgeError: the reasoner takes too long for one of them.
         """
         both = self, other
-        space = self.space.common(other.space)
+        space = self.space.union(other.space)
         one, two = (States.of(each.base, each.settings, max_failed, space) for each in both)
         states = one.shared(two)
         before, after = (decide_all(each.base, states, each.outcome, on_count) for each in both)

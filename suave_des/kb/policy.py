@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from suave_des.errors import number_of
+from suave_des.kb.reports import Reports
 from suave_des.kb.situations import INCONSISTENT, Decide, Outcome, Situation
-from suave_des.kb.space import PolicySpace, Reports, States, add_decisions, measured_attributes
+from suave_des.kb.space import PolicySpace, States, add_decisions, measured_attributes
 from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import regions_of

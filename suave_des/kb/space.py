@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import itertools
 import operator
-from collections import Counter, defaultdict
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property, partial
-from math import factorial, perm, prod
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from suave_des.errors import InputError, KnowledgeError
-from suave_des.kb.effects import has_effect, interchangeable_components, regions_by_attribute
+from suave_des.errors import InputError
+from suave_des.kb.effects import has_effect, interchangeable_components
+from suave_des.kb.reports import Reports, component_reports
 from suave_des.kb.scale import Scale
-from suave_des.kb.situations import Decide, OnCount, Outcome, Situation
+from suave_des.kb.situations import Outcome
 from suave_des.kb.states import LASTING, ManagingSettings
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import Ontology
@@ -32,43 +32,9 @@ if TYPE_CHECKING:
     import pandas
 
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would
-# take ten minutes.
+#: take ten minutes.
 MOST_STATES = 400_000
 _T = TypeVar("_T")
-
-#: (component, c_status) of those that report.
-Reports = tuple[tuple[str, str], ...]
-
-
-def component_reports(
-    groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int
-) -> dict[Reports, int]:
-    """All that at most so many components can report, up to an exchange in their group, fewest
-    reports first.
-
-    Returns:
-        reports of the first ones of each group of interchangeable components, with the number for
-        which they stand.
-    """
-    found = {}
-    for chosen in itertools.product(*(_reported(group, statuses, most) for group in groups)):
-        if sum(map(len, chosen)) <= most:
-            reports = sorted(itertools.chain.from_iterable(map(zip, groups, chosen)))
-            found[tuple(reports)] = prod(map(_number_alike, groups, chosen))
-    return found
-
-
-def _reported(
-    group: Sequence[str], statuses: Sequence[str], most: int
-) -> Iterator[tuple[str, ...]]:
-    """What at most so many components of a group can report, without who reports it."""
-    for count in range(min(most, len(group)) + 1):
-        yield from itertools.combinations_with_replacement(statuses, count)
-
-
-def _number_alike(group: Sequence[str], reported: Sequence[str]) -> int:
-    """In how many ways components of a group can report some statuses."""
-    return perm(len(group), len(reported)) // prod(map(factorial, Counter(reported).values()))
 
 
 @dataclass(frozen=True)
@@ -116,7 +82,7 @@ class PolicySpace:
         """The group of a component; empty if it has none."""
         return next((group for group in self.alike if component in group), ())
 
-    def common(self, other: PolicySpace) -> PolicySpace:
+    def union(self, other: PolicySpace) -> PolicySpace:
         """What has an effect in either; components are alike only if they are so in both that have
         them.
         """
@@ -176,8 +142,9 @@ class States:
         tasks = tuple(_tasks(base, settings, space))
         scale = space.scale
         attributes = space.attributes
+        measured: tuple[tuple[tuple[str, Decimal], ...], ...] = ()
+        # at least, as some places of the scale stand for several values
         total = len(scale) ** len(attributes) * len(reports) * len(tasks)
-        # else so many already that it does not matter how many values a range has
         if total <= MOST_STATES:
             measured = tuple(
                 tuple(
@@ -268,59 +235,3 @@ def _tasks(
         for designs in itertools.product(*(("", *base.designs(name)) for name in asked)):
             grounded = filter(operator.itemgetter(1), zip(asked, designs, strict=True))
             yield settings.state(dict.fromkeys(asked), dict(grounded))
-
-
-def kind_of(base: Ontology, space: PolicySpace) -> Callable[[KnowledgeState], Hashable]:
-    """Make a function that returns what the decision in a state can depend on: the same for all
-    decided alike.
-    """
-    functions = {*base.functions, *space.functions}
-    effects = {
-        each: [name for name in space.attributes if has_effect(base, name, each)]
-        for each in functions
-    }
-    regions = regions_by_attribute(base, space.attributes)
-
-    def kind(state: KnowledgeState) -> Hashable:
-        relevant = {name for each in state.objectives for name in effects[each.function]}
-        seen = tuple(
-            (name, value if regions is None else regions[name].region(value))
-            for name, value in state.measurements
-            if name in relevant
-        )
-        return state.objectives, state.groundings, state.components, seen
-
-    return kind
-
-
-def decide_all(base: Ontology, states: States, decide: Decide, on_count: OnCount) -> Decide:
-    """Decide every state; those that differ in nothing on which a decision can depend, once.
-
-    Args:
-        base: the ontologies and rules.
-        states: to decide.
-        decide: concludes what follows and is decided in a situation.
-        on_count: called with how many kinds of states have been inferred, first 0, and how many
-            have to be.
-
-    Returns:
-        what is decided in each of the states; a contradiction is told with the values of another
-        one of its kind.
-
-    Raises:
-        KnowledgeError: there is nothing to decide, or the reasoner takes too long.
-    """
-    if not any(map(base.designs, base.functions)):
-        problem = "no function has a function design, so there is nothing to decide"
-        remedy = "give an ontology that uses TOMASys as suave.owl does"
-        raise KnowledgeError(problem, file=", ".join(map(str, base.files)), remedy=remedy)
-    kind = kind_of(base, states.space)
-    different: dict[Hashable, KnowledgeState] = {}
-    decided = {}
-    for state in states:
-        different.setdefault(kind(state), state)
-    on_count(0, len(different))
-    for key, state in different.items():
-        decided[key] = decide(Situation(state))
-        on_count(len(decided), len(different))
-    return lambda situation: decided[kind(situation.state)]

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from functools import partial, reduce
 
 from suave_des.errors import InputError, did_you_mean, line_error, shown
+from suave_des.kb.deciding import decide_all
 from suave_des.kb.decision_table import DecisionTable
 from suave_des.kb.difference import PolicyDifference, compare_decisions
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.situations import Decide, OnCount, Outcome, Situation
-from suave_des.kb.space import PolicySpace, States, decide_all
+from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
 
 
@@ -32,7 +33,7 @@ def compare_deciders(
             design that the knowledge base does not have.
         KnowledgeError: the reasoner takes too long for one of them.
     """
-    space = reduce(PolicySpace.common, (each.space for each in both), knowledge.space)
+    space = reduce(PolicySpace.union, (each.space for each in both), knowledge.space)
     states = States.of(knowledge.base, knowledge.settings, max_failed, space)
     decide: list[Decide] = []
     bases = []
