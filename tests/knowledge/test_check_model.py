@@ -1,10 +1,11 @@
 """kb check: mistakes in the ontology: names, individuals, designs, kinds of things."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from suave_des.errors import Finding, KnowledgeError, Level
+from suave_des.errors import KnowledgeError, Level
 from suave_des.kb.check import check
 from suave_des.knowledge.checks import Subject
 from suave_des.resources import shipped_folder
@@ -20,6 +21,7 @@ from tests.helpers.checks import (
     individual,
     link,
     only,
+    subject,
     value,
     warnings,
 )
@@ -45,18 +47,40 @@ def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy,
     ]
 
 
-def test_components_that_nothing_reports_and_expectations_that_nothing_measures_are_noted(tmp_path):
+@pytest.fixture(scope="module")
+def unconnected(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """The shipped ontology with two components of which one has a status."""
     status = (
         '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
     )
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
-    findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=[])
-    notes = [one.message for one in findings if one.level is Level.NOTE and one.line]
-    assert notes[:2] == [
-        "missions do not measure water_visibility, so what designs expect of it is compared with nothing",
-        "nothing in the simulation reports the status of component c_camera, so it has none in missions",
+    return subject(tmp_path_factory.mktemp("unconnected"), extra=extra)
+
+
+@pytest.fixture(scope="module")
+def notes_on_missions(unconnected) -> list[str]:
+    """What is noted of them for missions that measure nothing."""
+    in_missions = replace(unconnected, reported=REPORTED_STATUSES, measured=[])
+    notes = [one for one in findings_of(in_missions) if one.level is Level.NOTE and one.line]
+    return [one.message for one in notes if "missions" in one.message]
+
+
+def test_an_expectation_that_no_mission_measures_is_noted(notes_on_missions):
+    unmeasured = [each for each in notes_on_missions if "measure" in each]
+    assert unmeasured == [
+        "missions do not measure water_visibility, so what designs expect of it is compared with nothing"
     ]
-    assert not any("missions" in one.message for one in found(tmp_path, extra=extra))
+
+
+def test_a_component_without_a_status_that_nothing_reports_is_noted(notes_on_missions):
+    unreported = [each for each in notes_on_missions if "reports" in each]
+    assert unreported == [
+        "nothing in the simulation reports the status of component c_camera, so it has none in missions"
+    ]
+
+
+def test_without_a_mission_nothing_is_noted_of_missions(unconnected):
+    assert not any("missions" in one.message for one in findings_of(unconnected))
 
 
 def test_the_model(tmp_path):
@@ -263,15 +287,18 @@ def test_right_edits(extra, tmp_path):
     )
 
 
-def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):
-    def problems(operator: str) -> list[Finding]:
-        return errors(
-            found(tmp_path, extra=individual("current", "QualityAttributeType", operator))
-        )
-
-    assert not problems(value("qa_comparison_operator", "&gt;=", "string"))
-    assert not problems("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>")
-    assert problems(value("qa_comparison_operator", "==", "string"))
+@pytest.mark.parametrize(
+    ("operator", "problems"),
+    [
+        (value("qa_comparison_operator", "&gt;=", "string"), 0),
+        ("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>", 0),
+        (value("qa_comparison_operator", "==", "string"), 1),
+    ],
+    ids=["with its datatype", "without", "unknown"],
+)
+def test_an_unknown_comparison_operator_is_an_error(tmp_path, operator, problems):
+    extra = individual("current", "QualityAttributeType", operator)
+    assert len(errors(found(tmp_path, extra=extra))) == problems
 
 
 def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import subprocess
 import tempfile
 from decimal import Decimal
 
@@ -104,13 +105,28 @@ os.wait()
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_with_java_a_process_prints_nothing_hears_ctrl_c_and_a_fork_of_it_is_told_instead_of_hanging():
+@pytest.fixture(scope="module")
+def process_with_java() -> subprocess.CompletedProcess[str]:
+    if not hasattr(os, "fork"):
+        pytest.skip("needs fork")
     # Python 3.12 and later warn of forks of a process with threads, as Java's are.
-    done = python("-W", "ignore::DeprecationWarning:__main__", "-c", PROGRAM)
-    assert (done.returncode, done.stderr) == (0, "")
-    reasoned, interrupted, forked = done.stdout.split("--\n")
-    assert (reasoned, interrupted) == ("", "interrupted\n")
+    return python("-W", "ignore::DeprecationWarning:__main__", "-c", PROGRAM)
+
+
+def test_with_java_a_process_ends_as_without(process_with_java):
+    assert (process_with_java.returncode, process_with_java.stderr) == (0, "")
+
+
+def test_java_prints_nothing(process_with_java):
+    assert process_with_java.stdout.split("--\n")[0] == ""
+
+
+def test_with_java_a_process_hears_ctrl_c(process_with_java):
+    assert process_with_java.stdout.split("--\n")[1] == "interrupted\n"
+
+
+def test_a_fork_of_a_process_with_java_is_told_instead_of_hanging(process_with_java):
+    forked = process_with_java.stdout.split("--\n")[2]
     assert "Java was started before this process was forked" in forked
 
 
@@ -154,12 +170,15 @@ def test_a_function_has_one_objective():
         KnowledgeState.of([ObjectiveState(SEARCH), ObjectiveState(SEARCH, "UNGROUNDED")])
 
 
-def test_importing_the_room_starts_and_loads_nothing():
+def test_importing_the_room_loads_no_library():
     code = (
         "import sys, suave_des.knowledge, suave_des.knowledge.state\n"
         "print([name for name in ('jpype', 'owlready2', 'rdflib') if name in sys.modules])"
     )
     assert python("-c", code).stdout.strip() == "[]"
+
+
+def test_importing_reasoners_starts_no_java():
     code = (
         "import jpype, suave_des.knowledge.reasoner\n"
         "from suave_des.knowledge.pellet import in_process, stock\n"

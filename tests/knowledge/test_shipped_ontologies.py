@@ -75,26 +75,40 @@ def test_the_terms_for_robots_are_in_a_file_of_their_own(tomasys, mros):
     assert not [term for term in tomasys.all_nodes() if str(term).startswith(MROS)]
 
 
-def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
-    for path in shipped.glob("*.owl"):
-        graph = Graph().parse(path, format="xml")
-        kinds = [
-            OWL.Class,
-            OWL.ObjectProperty,
-            OWL.DatatypeProperty,
-            OWL.NamedIndividual,
-            URIRef(SWRL + "Imp"),
-        ]
-        terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
-        assert terms
-        for term in terms:
-            assert graph.value(term, RDFS.label), term
-            assert graph.value(term, RDFS.comment), term
+@pytest.fixture(scope="module")
+def suave(shipped: Path) -> Graph:
+    return Graph().parse(shipped / "suave.owl", format="xml")
 
 
-def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
+def test_the_shipped_ontologies_are_these_three(shipped):
+    assert {path.stem for path in shipped.glob("*.owl")} == {"tomasys", "mros", "suave"}
+
+
+@pytest.mark.parametrize("name", ["tomasys", "mros", "suave"])
+@pytest.mark.parametrize("annotation", [RDFS.label, RDFS.comment], ids=["label", "comment"])
+def test_every_term_or_rule_is_annotated(request, name, annotation):
+    graph = request.getfixturevalue(name)
+    kinds = [
+        OWL.Class,
+        OWL.ObjectProperty,
+        OWL.DatatypeProperty,
+        OWL.NamedIndividual,
+        URIRef(SWRL + "Imp"),
+    ]
+    terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
+    assert terms
+    assert [term for term in terms if not graph.value(term, annotation)] == []
+
+
+def test_the_functions_have_the_exemplars_names(kb):
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
+
+
+def test_the_components_have_the_exemplars_names(kb):
     assert tuple(kb.model.components) == tuple(f"c_thruster_{n}" for n in range(1, 7))
+
+
+def test_the_quality_attributes_have_the_exemplars_names(kb):
     assert set(kb.model.attributes) == {
         "water_visibility",
         "battery_level",
@@ -102,6 +116,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "energy",
         "safety",
     }
+
+
+def test_the_expected_visibilities_are_the_deployed_ones(kb):
     visibility = {
         d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")
     }
@@ -110,6 +127,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "fd_spiral_low": Decimal("1.25"),
         "fd_spiral_medium": Decimal("2.25"),
     }
+
+
+def test_the_expected_performances_are_the_deployed_ones(kb):
     performance = {d: kb.expected(d)["performance"] for f in kb.functions for d in kb.designs(f)}
     assert performance == {
         "fd_all_thrusters": Decimal(1),
@@ -119,6 +139,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "fd_spiral_high": Decimal(1),
         "fd_follow_pipeline": Decimal(1),
     }
+
+
+def test_the_model_has_all_that_missions_need(kb):
     kb.check(kb.functions)
 
 

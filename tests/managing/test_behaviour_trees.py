@@ -127,12 +127,21 @@ def test_recharging_still_recovers_thrusters():
     assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
 
 
-def test_recharged_it_goes_on_and_ends_the_way_to_the_station():
+@pytest.fixture
+def recharged() -> dict[str, str]:
+    """What is asked for once a battery that was low is full again."""
     at_work = with_battery(0.2)
     at_work.adapt()
     at_work.measured("battery_level", 1.0)
-    asked = dict(at_work.adapt())
-    assert asked[SEARCH] == "fd_spiral_high" and asked[RECHARGE] == "inactive"
+    return dict(at_work.adapt())
+
+
+def test_recharged_it_goes_on(recharged):
+    assert recharged[SEARCH] == "fd_spiral_high"
+
+
+def test_recharged_it_ends_the_way_to_the_station(recharged):
+    assert recharged[RECHARGE] == "inactive"
 
 
 @pytest.mark.parametrize(
