@@ -7,6 +7,7 @@ import io
 import json
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -29,10 +30,14 @@ _BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
 EXPLOSION = f"explosion: {_BODY} -> o_updatable(o_generate_search_path, true)\n"
 
 
-def test_infers_the_error_and_plans_the_lower_spiral(knowledge):
-    reasoning = knowledge.infer(knowledge.state(**HIGH))
-    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, reasoning.inference.facts))
-    assert [(each.function, each.design) for each in reasoning.plan.decisions] == [
+def test_an_error_is_inferred(knowledge):
+    facts = knowledge.infer(knowledge.state(**HIGH)).inference.facts
+    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, facts))
+
+
+def test_a_lower_spiral_is_planned(knowledge):
+    plan = knowledge.infer(knowledge.state(**HIGH)).plan
+    assert [(each.function, each.design) for each in plan.decisions] == [
         ("f_generate_search_path", "fd_spiral_low")
     ]
 
@@ -70,7 +75,8 @@ def test_without_objectives_the_search_task_s_are_asked_for(knowledge):
     )
 
 
-def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
+@pytest.fixture
+def state_file(tmp_path) -> Path:
     file = tmp_path / "state.yaml"
     file.write_text(
         "objectives: [f_generate_search_path]\n"
@@ -78,10 +84,16 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
         "components: {c_thruster_1: FALSE}\n"  # YAML's own false
         "measurements: {water_visibility: 1.8}\n"
     )
-    assert knowledge.state(file).components == (("c_thruster_1", "FALSE"),)
-    state = knowledge.state(
-        file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"}
-    )
+    return file
+
+
+def test_the_false_of_yaml_is_a_status_like_any_other(knowledge, state_file):
+    assert knowledge.state(state_file).components == (("c_thruster_1", "FALSE"),)
+
+
+def test_words_win_over_the_file_that_they_complete(knowledge, state_file):
+    words = {"water_visibility": 3.0}, {"c_thruster_1": "RECOVERED"}
+    state = knowledge.state(state_file, measurements=words[0], components=words[1])
     assert str(dict(state.measurements)["water_visibility"]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
 
@@ -154,7 +166,9 @@ def test_a_contradiction_shows_no_text_as_such(tmp_path):
 
 
 class TestTimeLimit:
-    def test_names_the_state_that_takes_too_long_and_refuses_more(self, knowledge, monkeypatch):
+    @pytest.fixture
+    def given_up(self, knowledge, monkeypatch) -> Iterator[tuple[Reasoner, KnowledgeError]]:
+        """A reasoner that takes too long for a state, and what is told of it."""
         monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
         released = threading.Event()
         monkeypatch.setattr(
@@ -164,13 +178,19 @@ class TestTimeLimit:
         limit = TimeLimit()
         reasoner = Reasoner(knowledge.base, "pellet", limit)
         limit.seconds = 0.05
-        with pytest.raises(
-            KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after "
-        ):
+        with pytest.raises(KnowledgeError) as error:
             reasoner.analyze(knowledge.state(**HIGH))
+        yield reasoner, error.value
+        released.set()
+
+    def test_names_the_state_that_takes_too_long(self, given_up):
+        _, error = given_up
+        assert "fd_spiral_high, water_visibility = 1.8: not done after " in str(error)
+
+    def test_names_what_the_reasoner_still_does_when_it_refuses_more(self, given_up, knowledge):
+        reasoner, _ = given_up
         with pytest.raises(KnowledgeError, match="still reasoning"):
             reasoner.analyze(knowledge.state())
-        released.set()
 
     @pytest.mark.parametrize("reasoner", ["cached", "owlready2"])
     def test_holds_for_a_mission_too(self, tmp_path, reasoner):

@@ -50,7 +50,7 @@ def policy(knowledge):
 
 
 class TestScale:
-    def test_places_follow_one_another_and_have_a_value_of_their_own(self):
+    def test_places_follow_one_another(self):
         scale = Scale((Decimal(1), Decimal("2.5")))
         assert list(map(scale.text, range(len(scale)))) == [
             "not measured",
@@ -60,19 +60,17 @@ class TestScale:
             "2.5",
             "> 2.5",
         ]
-        values = list(map(scale.value, range(len(scale))))
-        assert values[0] is None
-        assert (
-            Decimal(0)
-            < values[1]
-            < values[2]
-            == 1
-            < values[3]
-            < values[4]
-            == Decimal("2.5")
-            < values[5]
-        )
-        assert scale.value(1) < scale.value(1, 2, 3) < 1 and scale.value(5, 0, 3) > Decimal("2.5")
+
+    def test_a_place_has_a_value_of_its_own(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        unmeasured, *values = map(scale.value, range(len(scale)))
+        assert unmeasured is None
+        assert 0 < values[0] < values[1] == 1 < values[2] < values[3] == Decimal("2.5") < values[4]
+
+    def test_an_open_range_has_several_values_in_their_order(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        assert scale.value(1) < scale.value(1, 2, 3) < 1
+        assert scale.value(5, 0, 3) > Decimal("2.5")
 
     def test_neighbours_are_told_as_one_range(self):
         scale = Scale((Decimal(1), Decimal("2.5")))

@@ -1,13 +1,15 @@
 """kb check: mistakes in the ontology: names, individuals, designs, kinds of things."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from suave_des.errors import KnowledgeError, Level
+from suave_des.errors import Finding, KnowledgeError, Level
 from suave_des.kb.check import check
-from suave_des.knowledge.checks import Subject
+from suave_des.knowledge.checks import Subject, static_findings
+from suave_des.knowledge.resolver import collect
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import REPORTED_STATUSES, open_base, subject_of
@@ -158,7 +160,7 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
     path = tmp_path / "edited.owl"
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     path.write_text(text.replace(right, wrong, 1), encoding="utf-8")
-    error = only(findings_of(Subject([path])), f"{message} is not defined")
+    error = only(static_findings(Subject([path]), collect([path])), f"{message} is not defined")
     assert (error.level, error.file, error.remedy) == (
         Level.ERROR,
         str(path),
@@ -250,19 +252,32 @@ WRONG = {
 }
 
 
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Finding, ...]]:
+    """What is found where missions measure the visibility and components report."""
+
+    def find(extra: str) -> tuple[Finding, ...]:
+        given = {"reported": REPORTED_STATUSES, "measured": ["water_visibility"]}
+        return found(tmp_path_factory.mktemp("edited"), extra=extra, **given)
+
+    return find
+
+
+@pytest.fixture(scope="module")
+def wrong(edited) -> tuple[Finding, ...]:
+    """What is found with all wrong edits: shapes take a second, whatever they are checked of."""
+    return edited("".join(extra for extra, _ in WRONG.values()))
+
+
 @pytest.mark.parametrize("case", WRONG)
-def test_an_edit_that_means_something_else(case, tmp_path):
-    extra, message = WRONG[case]
-    findings = found(
-        tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]
-    )
-    finding = next(each for each in warnings(findings) if each.message.startswith(message))
+def test_an_edit_that_means_something_else(case, wrong):
+    _, message = WRONG[case]
+    finding = next(each for each in warnings(wrong) if each.message.startswith(message))
     assert finding.line is not None
 
 
-@pytest.mark.parametrize(
-    "extra",
-    [
+def test_right_edits(edited):
+    right = (
         individual("c_thruster_7", "Component", same("c_thruster_1")),
         subclass("SearchDesign", "FunctionDesign"),
         subclass("fd_quick", "FunctionDesign")
@@ -272,19 +287,15 @@ def test_an_edit_that_means_something_else(case, tmp_path):
         )
         + ESTIMATE,
         individual("fd_spiral_low", inside="<rdfs:comment>no facts</rdfs:comment>"),
-        individual("c_thruster_1", inside=value("c_status", "FALSE", "string")),
-        individual("c_thruster_1", inside=value("c_status", "worn", "string")),
+        individual("c_thruster_2", inside=value("c_status", "FALSE", "string")),
+        individual("c_thruster_3", inside=value("c_status", "worn", "string")),
         individual(
             "obs_water_visibility",
             "QAvalue",
             link("isQAtype", "water_visibility") + value("hasValue", "2.5"),
         ),
-    ],
-)
-def test_right_edits(extra, tmp_path):
-    assert not warnings(
-        found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
     )
+    assert warnings(edited("".join(right))) == []
 
 
 @pytest.mark.parametrize(

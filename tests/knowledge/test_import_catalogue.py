@@ -319,13 +319,6 @@ def test_a_group_of_the_catalog_has_its_own_base(tmp_path):
     assert reasons(app)["app.owl", LIB] == (lib, "by catalog-v001.xml")
 
 
-def test_a_catalog_that_is_no_xml_is_named(tmp_path):
-    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
-    (tmp_path / "catalog-v001.xml").write_text("<catalog", encoding="utf-8")
-    with pytest.raises(KnowledgeError, match=r"catalog-v001.xml: not well-formed XML"):
-        collect([app])
-
-
 def test_damaged_files_beside_are_nobodys_input(tmp_path):
     app = written(tmp_path / "app.owl", "http://example.org/app", "http://ros/mros")
     (tmp_path / "old.owl").write_text("about http://ros/mros, and no XML", encoding="utf-8")

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import QA_OPERATOR, Lit
 from suave_des.knowledge.reasoner import Reasoner
@@ -231,18 +230,6 @@ def test_a_required_performance_counts_designs_that_tell_none_as_bad(suave_copy)
     assert {r.design for r in decision.rejected} == {"fd_drift", "fd_spiral_low", "fd_spiral_high"}
 
 
-def test_a_required_value_without_operator_is_an_error(suave_copy):
-    path = suave_copy(
-        individual("noise", "QualityAttributeType")
-        + individual("nfr", "QAvalue", ("isQAtype", ":noise"), ("hasValue", "0.5"))
-        + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
-    )
-    with pytest.raises(
-        KnowledgeError, match="requires a value of noise, which has no qa_comparison_operator"
-    ):
-        decide_with(path, searching(None, 2.5, status="UNGROUNDED"))
-
-
 @pytest.mark.parametrize(
     ("operator", "allowed"), [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])]
 )
@@ -306,13 +293,6 @@ def test_an_overridden_value_decides(overridden):
 
 def test_overridden_values_show_in_the_hash(kb, overridden):
     assert overridden.content_hash != kb.content_hash
-
-
-def test_a_state_with_an_unknown_design_or_function_is_refused(pellet):
-    with pytest.raises(KnowledgeError, match="no function design fd_spiral_hgih"):
-        pellet.analyze(searching("fd_spiral_hgih"))
-    with pytest.raises(KnowledgeError, match="no function f_dance"):
-        pellet.analyze(KnowledgeState.of([ObjectiveState("f_dance")]))
 
 
 def test_what_monitors_report_beyond_the_model_has_no_effect(pellet):
