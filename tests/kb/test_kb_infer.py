@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_mission
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
@@ -96,39 +96,6 @@ def test_words_win_over_the_file_that_they_complete(knowledge, state_file):
     state = knowledge.state(state_file, measurements=words[0], components=words[1])
     assert str(dict(state.measurements)["water_visibility"]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            "measurements: {water_visibilty: 1}\n",
-            "line 1, measurements.water_visibilty: there is no quality attribute",
-        ),
-        (
-            "measurements:\n  water_visibility: deep\n",
-            "line 2, measurements.water_visibility: 'deep' is not a number",
-        ),
-        (
-            "groundings: {f_maintain_motion: fd_spiral_low}\n",
-            "f_maintain_motion has no function design",
-        ),
-        (
-            "components: {c_thruster_1: recoverd}\n",
-            "no rule mentions the c_status 'recoverd' (did you mean 'REC",
-        ),
-        ("component: {}\n", "did you mean 'components'"),
-        ("components: 3\n", "line 1, components: "),
-        ("", "is empty"),
-    ],
-)
-def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
-    file = tmp_path / "state.yaml"
-    file.write_text(text)
-    with pytest.raises(InputError) as error:
-        knowledge.state(file)
-    assert said in str(error.value)
-    assert str(file) in str(error.value)
 
 
 def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
@@ -364,33 +331,6 @@ def test_the_command_notes_unknown_names_on_its_error_stream(command):
         noted
         == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("SELECT WHERE", "not a SPARQL query"),
-        ("", "not a SPARQL query"),
-        (
-            "SELECT ?s WHERE { ?s nowhere:is ?o }",
-            "not a SPARQL query: Unknown namespace prefix : nowhere",
-        ),
-        ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
-        (
-            "SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }",
-            "SERVICE and FROM read from other sources",
-        ),
-        (
-            "SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }",
-            "SERVICE and FROM read from other sources",
-        ),
-    ],
-)
-def test_what_is_no_query_of_the_knowledge_base_is_refused(knowledge, text, said):
-    with pytest.raises(InputError) as error:
-        knowledge.query(text)
-    assert said in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_the_command_prints_tables(command):

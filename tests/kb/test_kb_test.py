@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from suave_des.errors import InputError
 from suave_des.kb.rule_tests import TestFile, mission_states, run_test, shipped_tests
 from suave_des.kb.scale import Scale, is_in, measurements_in, parse_region
 from tests.helpers.command import command_here
@@ -203,24 +202,6 @@ def test_a_test_whose_state_cannot_be_decided_fails_alone(suave_copy, command, t
         f"FAILED {tests}:2: undecided: the state cannot be decided: " in out
         and "qa_comparison_operator" in out
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            "- name: x\n  folows: []",
-            "line 3, tests[0].folows: unknown key 'folows' (did you mean 'follows'?",
-        ),
-        ("- name: x", "line 2, tests[0]: this test expects nothing"),
-        ("- name: x\n  contradiction: maybe", "line 3, tests[0].contradiction: "),
-    ],
-)
-def test_a_file_that_is_not_as_it_must_be_is_refused_with_line_key_and_remedy(suite, text, said):
-    with pytest.raises(InputError) as error:
-        suite(text + "\n")
-    assert said in str(error.value)
-    assert "mine.yaml: line" in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, _spans, function_table
 from suave_des.kb.scale import Scale
@@ -190,13 +189,6 @@ class TestPolicy:
             PolicySpace.of(KnowledgeBase.load(rules=[file]).base, settings).attributes
             == settings.measured
         )
-
-    def test_too_many_states_are_refused(self, knowledge):
-        many = PolicySpace(
-            ("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ()
-        )
-        with pytest.raises(InputError, match="kinds of states, which is too many"):
-            knowledge.policy(9, space=many)
 
 
 def test_the_csv_file_has_every_cell(command, tmp_path, policy):

@@ -167,35 +167,6 @@ class TestDecisions:
         )
 
 
-@pytest.mark.parametrize(
-    ("question", "said"),
-    [
-        (
-            "fg_status(fg_spiral_high, IN_ERROR_FR)",
-            "does not follow in this state (fg_status of fg_spiral_high: IN_E",
-        ),
-        (
-            "fg_status(fg_spiral_hi, IN_ERROR_FR)",
-            "there is no individual 'fg_spiral_hi' (did you mean fg_spiral_high?",
-        ),
-        (
-            "why fd_spiral_lo?",
-            "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'",
-        ),
-        (
-            "fg_statu(fg_spiral_high, IN_ERROR_FR)",
-            "there is no property 'fg_statu' (did you mean fg_status?",
-        ),
-        ("because", "'because' is not a question about a state"),
-        ("fg_status(", "is not a fact"),
-    ],
-)
-def test_a_question_that_has_no_answer_is_told_so(knowledge, in_error, question, said):
-    with pytest.raises(InputError) as error:
-        knowledge.explain(in_error, question)
-    assert said in str(error.value)
-
-
 def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowledge):
     """No thruster is required by fd_spiral_high: whether one has failed does not matter."""
     with pytest.raises(

@@ -202,11 +202,6 @@ def test_recurring_questions_are_answered_in_one_line(name, suave_copy, tmp_path
     assert CASES[name][3] in found
 
 
-def test_a_rule_that_is_not_there_is_refused_with_the_nearest_name(knowledge):
-    with pytest.raises(InputError, match="did you mean 'compError'"):
-        RuleQuestions(knowledge.base).why_not("compEror", knowledge.state())
-
-
 def test_numbers_match_where_they_do_in_pellet(tmp_path):
     base = numbers_ontology(tmp_path)
     found = Reasoner(base, "pellet", terms=base.content.all_terms()).analyze(KnowledgeState()).facts
