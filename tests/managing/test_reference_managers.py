@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
-from suave_des import InputError, run_campaign, run_mission
-from suave_des.registry import is_built_in, manager_class
+from suave_des import run_mission
+from suave_des.registry import is_built_in
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import support
 from suave_des.simulation.simulator import Simulator
@@ -135,16 +135,6 @@ def test_fixed_sets_its_mode_at_the_start(with_a_fixed_mode):
 def test_fixed_never_adapts(with_a_fixed_mode):
     later = [detail for _, detail in with_a_fixed_mode if "unground" not in detail][1:]
     assert later == ["f_follow_pipeline -> fd_follow_pipeline"]
-
-
-def test_a_mode_that_no_function_has_is_refused_before_any_mission():
-    with pytest.raises(InputError, match="did you mean 'fd_spiral_high'"):
-        run_campaign("seams2023", ["fixed:fd_spiral_hihg"], runs=1)
-
-
-def test_fixed_without_a_mode_is_refused():
-    with pytest.raises(InputError, match="write fixed:MODE"):
-        manager_class("fixed:")
 
 
 def test_they_need_no_trust_as_they_are_the_projects_own():

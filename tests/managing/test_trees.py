@@ -104,10 +104,6 @@ def test_the_command_draws_the_tree_of_a_manager(manager, scenario):
     assert ("battery is below 0.25" in shown) is (manager == "bt_extended")
 
 
-def test_a_manager_without_tree_is_refused():
-    assert "has no tree" in str(CliRunner().invoke(app, ["tree", "metacontrol"]).exception)
-
-
 @pytest.fixture(scope="module")
 def ours() -> MissionResult:
     """A mission with the tree bt."""
