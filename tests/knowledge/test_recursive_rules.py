@@ -194,7 +194,7 @@ def test_generated_recursive_rules_conclude_all_that_applying_them_does(tmp_path
     assert several > count / 2
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
 def test_stock_owlready2_concludes_the_same_from_generated_recursive_rules(tmp_path, count):
     for number in range(count):
         given = generated(number)

@@ -9,6 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
+from rdflib.term import Node
+
+from suave_des.resources import shipped_folder
 
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
@@ -75,19 +78,14 @@ def test_the_terms_for_robots_are_in_a_file_of_their_own(tomasys, mros):
     assert not [term for term in tomasys.all_nodes() if str(term).startswith(MROS)]
 
 
-@pytest.fixture(scope="module")
-def suave(shipped: Path) -> Graph:
-    return Graph().parse(shipped / "suave.owl", format="xml")
-
-
-def test_the_shipped_ontologies_are_these_three(shipped):
-    assert {path.stem for path in shipped.glob("*.owl")} == {"tomasys", "mros", "suave"}
-
-
-@pytest.mark.parametrize("name", ["tomasys", "mros", "suave"])
-@pytest.mark.parametrize("annotation", [RDFS.label, RDFS.comment], ids=["label", "comment"])
-def test_every_term_or_rule_is_annotated(request, name, annotation):
-    graph = request.getfixturevalue(name)
+@pytest.fixture(
+    scope="module",
+    params=sorted(shipped_folder("ontology").glob("*.owl")),
+    ids=lambda path: path.stem,
+)
+def terms(request: pytest.FixtureRequest) -> tuple[Graph, set[Node]]:
+    """An ontology, with its terms and rules."""
+    graph = Graph().parse(request.param, format="xml")
     kinds = [
         OWL.Class,
         OWL.ObjectProperty,
@@ -95,9 +93,14 @@ def test_every_term_or_rule_is_annotated(request, name, annotation):
         OWL.NamedIndividual,
         URIRef(SWRL + "Imp"),
     ]
-    terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
-    assert terms
-    assert [term for term in terms if not graph.value(term, annotation)] == []
+    return graph, {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
+
+
+@pytest.mark.parametrize("annotation", [RDFS.label, RDFS.comment], ids=["label", "comment"])
+def test_every_term_or_rule_is_annotated(terms, annotation):
+    graph, annotated = terms
+    assert annotated
+    assert [term for term in annotated if not graph.value(term, annotation)] == []
 
 
 def test_the_functions_have_the_exemplars_names(kb):
