@@ -153,33 +153,6 @@ def test_results_are_written_as_junit_xml(spare):
     ]
 
 
-def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_path, command):
-    (tmp_path / "spare.swrl").write_text(SPARE, encoding="utf-8")
-    tests = tmp_path / "spare.yaml"
-    tests.write_text(
-        textwrap.dedent("""
-            rules: [spare.swrl]
-            tests:
-            - name: not high below 3.5 m
-              given: {groundings: {f_generate_search_path: fd_spiral_medium}, measurements: {water_visibility: "< 3.5"}}
-              follows: ["fd_realisability(fd_spiral_high, false)"]
-            - name: wrong <&>
-              given: {measurements: {water_visibility: 2}}
-              follows: ["fd_realisability(fd_spiral_high, false)"]
-            """),
-        encoding="utf-8",
-    )
-    status, out, _ = command("test", tests, "--junit-xml", tmp_path / "out.xml")
-    assert status == 1
-    assert "1 failed, 1 passed" in out
-    root = ElementTree.parse(tmp_path / "out.xml").getroot()
-    assert [(suite.get("tests"), suite.get("failures")) for suite in root] == [("2", "1")]
-    assert [case.get("name") for case in root.iter("testcase")] == [
-        "not high below 3.5 m",
-        "wrong <&>",
-    ]
-
-
 def test_a_test_whose_state_cannot_be_decided_fails_alone(suave_copy, command, tmp_path):
     """Planning compares required values with an operator, which this quality attribute does not
     have.

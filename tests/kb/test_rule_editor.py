@@ -93,7 +93,7 @@ def test_adding_a_rule_is_nothing_but_an_insertion(styled):
     assert original[:at] + added[at : len(added) - len(rest)] + rest == added
 
 
-def test_a_rule_is_switched_off_and_on_again(styled):
+def test_switching_a_rule_changes_nothing_but_its_mark(styled):
     add_rules(styled, BATTERY)
     (rule,) = (each for each in said(styled) if each[0] == "Battery")
     others = said(styled) - {rule}

@@ -103,7 +103,7 @@ def test_a_lost_thruster_is_recovered_by_the_next_cycle(recovery):
     assert 35.0 <= recover_s <= 36.0 + period_s
 
 
-def test_a_recovery_lasts_its_time_and_up_to_a_cycle(recovery):
+def test_a_recovery_ends_within_a_cycle_of_its_time(recovery):
     period_s, (_, (recover_s, _), (back_s, _)) = recovery
     assert recover_s + 10.0 <= back_s <= recover_s + 11.5 + period_s
 
