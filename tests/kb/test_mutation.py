@@ -341,30 +341,33 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
         assert difference(small.outcome(situation), changed.outcome(situation)) == found.reason
 
 
+@pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.slow)])
+def base(request: pytest.FixtureRequest, knowledge) -> KnowledgeBase:
+    if request.param:
+        return knowledge
+    # what fires depends on these two alone
+    others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
+    return KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
+
+
+@pytest.fixture(scope="module")
+def situations(tmp_path_factory, knowledge) -> list[Situation]:
+    tests = read_tests(tmp_path_factory.mktemp("coverage"), knowledge, LOW_AND_HIGH)
+    return [situation for test in tests for situation in test.situations]
+
+
+@pytest.fixture(scope="module")
+def counted(base, situations) -> tuple[Coverage, list[tuple[int, int]]]:
+    """The coverage, and the counts that were told while it was measured."""
+    counts: list[tuple[int, int]] = []
+    coverage = measure_coverage(
+        base, situations, max_failed=0, on_count=lambda *count: counts.append(count)
+    )
+    return coverage, counts
+
+
 class TestCoverage:
     """What tests of one rule cover, and what is proposed to cover the rest."""
-
-    @pytest.fixture(scope="class", params=[False, pytest.param(True, marks=pytest.mark.slow)])
-    def rules(self, request: pytest.FixtureRequest, knowledge) -> KnowledgeBase:
-        if request.param:
-            return knowledge
-        # what fires depends on these two alone
-        others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
-        return KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
-
-    @pytest.fixture(scope="class")
-    def situations(self, tmp_path_factory, knowledge) -> list[Situation]:
-        tests = read_tests(tmp_path_factory.mktemp("coverage"), knowledge, LOW_AND_HIGH)
-        return [situation for test in tests for situation in test.situations]
-
-    @pytest.fixture(scope="class")
-    def counted(self, rules, situations) -> tuple[Coverage, list[tuple[int, int]]]:
-        """The coverage, and the counts that were told while it was measured."""
-        counts: list[tuple[int, int]] = []
-        coverage = measure_coverage(
-            rules, situations, max_failed=0, on_count=lambda *count: counts.append(count)
-        )
-        return coverage, counts
 
     def test_each_state_is_counted_while_it_is_measured(self, counted):
         counts, states = counted[1], len(counted[1])
@@ -382,9 +385,9 @@ class TestCoverage:
         fires = Goal("S10", -1, adequacy.FIRES)
         assert fires not in counted[0].missing and fires not in counted[0].covered
 
-    def test_with_the_proposed_states_nothing_is_missing(self, rules, situations, counted):
+    def test_with_the_proposed_states_nothing_is_missing(self, base, situations, counted):
         proposed = [Situation(state) for state, _ in counted[0].proposed]
-        assert not measure_coverage(rules, [*situations, *proposed], max_failed=0).missing
+        assert not measure_coverage(base, [*situations, *proposed], max_failed=0).missing
 
 
 @pytest.fixture(scope="module")

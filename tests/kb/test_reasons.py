@@ -113,23 +113,25 @@ def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path
     assert dict(trees[0].bindings)["q"] == "qa_water_visibility_high"
 
 
-class TestDecisions:
-    @pytest.fixture(scope="class")
-    def left_out(self, knowledge, in_error) -> tuple[str, ...]:
-        (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
-        return decision
+@pytest.fixture(scope="module")
+def left_out(knowledge, in_error) -> tuple[str, ...]:
+    (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
+    return decision
 
+
+@pytest.fixture(scope="module")
+def chosen(knowledge, in_error) -> tuple[str, ...]:
+    (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
+    return decision
+
+
+class TestDecisions:
     def test_why_not_names_the_filter(self, left_out):
         assert left_out[0] == "f_maintain_motion: fd_all_thrusters is left out: not realisable"
 
     def test_why_not_tells_how_the_fact_of_the_filter_follows(self, left_out):
         at = left_out.index("  fd_all_thrusters: left out: not realisable")
         assert "[by rule compError with " in left_out[at + 1]
-
-    @pytest.fixture(scope="class")
-    def chosen(self, knowledge, in_error) -> tuple[str, ...]:
-        (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
-        return decision
 
     def test_why_tells_what_called_for_the_decision(self, chosen):
         assert chosen[1] == "  adapted because"
