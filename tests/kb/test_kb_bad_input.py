@@ -242,7 +242,7 @@ def test_a_rule_that_reads_any_status_makes_every_status_one_to_give(tmp_path):
 
 def test_a_state_is_there_from_the_very_time_of_its_record(folder):
     assert recorded_state(folder / "flown", "1").grounded(SEARCH) == "fd_spiral_low"
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=r"has no state until 0\.999 s"):
         recorded_state(folder / "flown", "0.999")
 
 
