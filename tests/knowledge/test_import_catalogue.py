@@ -253,7 +253,7 @@ def test_an_import_that_no_file_supplies_is_told_as_written_with_its_place(tmp_p
     with pytest.raises(KnowledgeError) as error:
         collect([app])
     assert (error.value.file, error.value.place) == (str(app), "line 4")
-    assert f"import {iri}" in error.value.problem.replace(app.parent.as_uri() + "/", "")
+    assert error.value.problem.startswith(f"import {iri} does not resolve")
 
 
 @pytest.mark.parametrize("ending", ["owl", "ttl"])
