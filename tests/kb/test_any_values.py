@@ -90,9 +90,3 @@ def test_a_test_of_rules_with_any_value_is_run_or_refused(
 def test_a_state_takes_text_alone(parts, status):
     with pytest.raises(InputError, match="c_thruster_1: "):
         KnowledgeState.of(**parts(status))
-
-
-@pytest.mark.parametrize("name", ["measurements", "components", "groundings"])
-def test_parts_of_a_state_that_are_no_mapping_are_refused(knowledge, name):
-    with pytest.raises(InputError, match=f"^{name}: expected a mapping"):
-        knowledge.state(**{name: 3})

@@ -5,6 +5,7 @@ import json
 import re
 import time
 from decimal import Decimal
+from pathlib import Path
 
 import pytest
 
@@ -14,28 +15,35 @@ from suave_des.knowledge.checks import Subject
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.reasoner import regions_of
+from suave_des.knowledge.state import KnowledgeState
 from suave_des.resources import shipped_folder
 from tests.helpers.checks import SUAVE, errors, findings_of, found_by_pellet, only, subject
 from tests.helpers.command import suave_des_command
 from tests.helpers.owl_text import individual
 
 
-def test_the_shipped_ontology_has_a_note_for_each_file_with_rules_for_other_models(tmp_path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One for all tests that are about rules: shapes of the same file are checked once."""
+    return tmp_path_factory.mktemp("checked")
+
+
+def test_the_shipped_ontology_has_a_note_for_each_file_with_rules_for_other_models(folder):
     notes = check(Subject())
     assert [(each.level, each.rule) for each in notes] == [(Level.NOTE, None)] * 2
     never = "rules for other models, which never fire in this one: "
     assert [each.message.removeprefix(never)[:8] for each in notes] == ["QAenergy", "S10, S11"]
     # A copy of one's own is told which files supply its imports, too.
-    assert [each.level for each in found_by_pellet(tmp_path)] == [Level.NOTE] * 3
+    assert [each.level for each in found_by_pellet(folder)] == [Level.NOTE] * 3
 
 
-def test_pellet_is_not_asked_again_about_what_did_not_change(tmp_path, monkeypatch):
+def test_pellet_is_not_asked_again_about_what_did_not_change(folder, monkeypatch):
     rules = "A: hasValue(?q, ?v) ^ lessThan(?v, 1) -> Role(?q)\n"
-    findings = found_by_pellet(tmp_path, rules)
+    findings = found_by_pellet(folder, rules)
     monkeypatch.setattr(InProcessPellet, "__init__", lambda *_: pytest.fail("Java was asked"))
-    assert found_by_pellet(tmp_path, rules) == findings
+    assert found_by_pellet(folder, rules) == findings
     with pytest.raises(pytest.fail.Exception, match="Java was asked"):
-        found_by_pellet(tmp_path, rules.replace("1", "1.1"))
+        found_by_pellet(folder, rules.replace("1", "1.1"))
 
 
 def test_shapes_are_checked_once_for_the_same_files(tmp_path, monkeypatch):
@@ -51,13 +59,27 @@ def test_shapes_are_checked_once_for_the_same_files(tmp_path, monkeypatch):
         shaped("other")
 
 
-def test_the_states_that_pellet_is_asked_about_have_each_design_with_each_report_and_range():
+@pytest.fixture(scope="module")
+def asked() -> tuple[Ontology, list[KnowledgeState]]:
+    """The shipped ontologies, and the states that Pellet is asked about."""
     base = Ontology.load()
-    states = list(states_to_ask(base))
-    assert len(states) < 100
+    return base, list(states_to_ask(base))
+
+
+def test_pellet_is_asked_about_few_states(asked):
+    assert len(asked[1]) < 100
+
+
+def test_pellet_is_asked_about_each_design_with_each_report(asked):
+    base, states = asked
     for function in base.functions:
         wanted = set(itertools.product(base.designs(function), ("FALSE", "RECOVERED")))
         assert {(state.grounded(function), state.components[0][1]) for state in states} == wanted
+
+
+def test_pellet_is_asked_about_each_design_with_each_range_of_values(asked):
+    base, states = asked
+    for function in base.functions:
         wanted = set(itertools.product(base.designs(function), regions_of(base).thresholds))
         assert {
             (state.grounded(function), dict(state.measurements).get("water_visibility"))
@@ -70,15 +92,15 @@ def test_an_attribute_that_is_declared_again_with_the_same_operator_is_no_error(
     assert not errors(check(Subject([suave_copy(again)])))
 
 
-def test_contradictions_come_from_pellet(tmp_path):
+def test_contradictions_come_from_pellet(folder):
     rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
-    (error,) = errors(found_by_pellet(tmp_path, rules))
+    (error,) = errors(found_by_pellet(folder, rules))
     assert "by the rule A (mine.swrl, line 1)" in error.message
 
 
-def test_exact_values_are_reported(tmp_path):
+def test_exact_values_are_reported(folder):
     rules = "A: hasValue(?q, ?v) ^ add(?s, ?v, 1) ^ lessThan(?s, 2) -> Role(?q)"
-    assert only(found_by_pellet(tmp_path, rules), "rule A computes with add").level is Level.NOTE
+    assert only(found_by_pellet(folder, rules), "rule A computes with add").level is Level.NOTE
 
 
 @pytest.fixture
@@ -129,13 +151,13 @@ def test_what_has_no_effect_in_the_scenario_is_a_warning_with_its_file(command, 
     assert finding["message"].startswith("thruster_events.0: ")
 
 
-def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path):
+def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(folder):
     high = "fd_spiral_high"
     rules = f"""
 one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
 """
     # QAWaterVisibility says that it is IN_ERROR_NFR
-    (error,) = errors(found_by_pellet(tmp_path, rules))
+    (error,) = errors(found_by_pellet(folder, rules))
     assert "contradiction" in error.message
     rules_in_it = (
         r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"
@@ -143,23 +165,23 @@ one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v,
     assert re.search(rules_in_it, error.message)
 
 
-def test_values_of_the_scenario_are_used(tmp_path):
+def test_values_of_the_scenario_are_used(folder):
     body = "typeFD(?fg, fd_spiral_low) ^ hasValue(qa_water_visibility_low, ?v) ^ lessThan(?v, 0.2)"
     rules = "".join(
         f'{name}: {body} -> fg_status(?fg, "IN_ERROR_{name}")\n' for name in ("FR", "NFR")
     )
-    assert errors(found_by_pellet(tmp_path, rules)) == []
+    assert errors(found_by_pellet(folder, rules)) == []
     (error,) = errors(
-        found_by_pellet(tmp_path, rules, values={"qa_water_visibility_low": Decimal("0.125")})
+        found_by_pellet(folder, rules, values={"qa_water_visibility_low": Decimal("0.125")})
     )
     assert "by the rules FR (mine.swrl, line 1), NFR (mine.swrl, line 2)" in error.message
     with pytest.raises(KnowledgeError, match="qa_water_visibility_lo"):
-        found_by_pellet(tmp_path, values={"qa_water_visibility_lo": Decimal(1)})
+        found_by_pellet(folder, values={"qa_water_visibility_lo": Decimal(1)})
 
 
-def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path):
+def test_a_reasoner_that_takes_too_long_is_given_up_on(folder):
     # A rule that nobody has asked about before.
-    findings = found_by_pellet(tmp_path, "slow: Role(?r) -> Role(?r)\n", time_limit_s=1e-6)
+    findings = found_by_pellet(folder, "slow: Role(?r) -> Role(?r)\n", time_limit_s=1e-6)
     assert "not done after" in errors(findings)[0].message
 
 
@@ -172,8 +194,8 @@ class TestBeforeItRuns:
         assert any("class Nowhere is not defined" in message for message in messages)
         assert any("contradiction" in message for message in messages)
 
-    def test_what_was_skipped_is_said(self, tmp_path):
-        findings = found_by_pellet(tmp_path, "A: Role(?x) -> Role(?y)")
+    def test_what_was_skipped_is_said(self, folder):
+        findings = found_by_pellet(folder, "A: Role(?x) -> Role(?y)")
         assert only(findings, "not checked with Pellet").level is Level.NOTE
 
 
@@ -202,16 +224,16 @@ def test_a_rule_that_never_comes_to_an_end_is_an_error(tmp_path):
         'A: c_status(?c, "FALSE") ^ Objective(?o) -> o_status(?o, "IN_ERROR_COMPONENT")',  # if visibility is low, too
     ],
 )
-def test_rules_that_clash_once_a_component_fails(tmp_path, rule):
-    (error,) = errors(found_by_pellet(tmp_path, rule))
+def test_rules_that_clash_once_a_component_fails(folder, rule):
+    (error,) = errors(found_by_pellet(folder, rule))
     assert "more than one value" in error.message
     assert "c_status(c_thruster_1, FALSE)" in error.message
 
 
-def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measure(tmp_path):
+def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measure(folder):
     rule = 'A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> fg_status(?g, "IN_ERROR_FR")'
-    assert errors(found_by_pellet(tmp_path, rule))
-    assert not errors(found_by_pellet(tmp_path, rule, measured={"water_visibility"}))
+    assert errors(found_by_pellet(folder, rule))
+    assert not errors(found_by_pellet(folder, rule, measured={"water_visibility"}))
 
 
 @pytest.mark.slow

@@ -46,23 +46,22 @@ def bolder(suave_copy):
     return suave_copy(replace={">3.25<": ">2.75<"}, name="bolder.owl")
 
 
-def test_a_changed_value_is_one_axiom_removed_and_one_added(bolder):
+def test_a_changed_value_is_one_axiom_in_place_of_another(bolder):
     removed, added = compare_axioms(Ontology.load(), Ontology.load([bolder]))
     assert removed == ["hasValue(qa_water_visibility_high, 3.25)"]
     assert added == ["hasValue(qa_water_visibility_high, 2.75)"]
 
 
 def test_class_expressions_are_compared_whatever_their_nodes_are_called(suave_copy):
-    one, again = (
-        Ontology.load([suave_copy(FAILED)]),
-        Ontology.load([suave_copy(FAILED, name="again.owl")]),
-    )
-    assert compare_axioms(one, again) == ([], [])
-    (added,) = [
-        text for text in compare_axioms(Ontology.load(), one)[1] if "equivalentClass" in text
-    ]
-    assert 'hasValue "FALSE"' in added
-    assert "onProperty c_status" in added
+    copies = (suave_copy(FAILED), suave_copy(FAILED, name="again.owl"))
+    assert compare_axioms(*(Ontology.load([each]) for each in copies)) == ([], [])
+
+
+def test_a_class_expression_is_told_with_what_it_says(suave_copy):
+    _, added = compare_axioms(Ontology.load(), Ontology.load([suave_copy(FAILED)]))
+    (told,) = (text for text in added if "equivalentClass" in text)
+    assert 'hasValue "FALSE"' in told
+    assert "onProperty c_status" in told
 
 
 def test_rules_count_with_their_text(tmp_path):
@@ -99,7 +98,7 @@ def test_states_are_counted_in_which_a_rule_fires_that_only_one_of_two_has(tmp_p
         assert firing == (states if number == 0 else 0)
 
 
-def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
+def test_the_command_compares_in_one_table(bolder, command):
     shipped = shipped_folder("ontology") / "suave.owl"
     arguments = ("diff", shipped, bolder, "--max-failed", "0", "--quiet", "--missions")
     status, out, _ = command(*arguments, "2")
@@ -219,7 +218,7 @@ def rules_file(tmp_path: Path, text: str) -> Path:
 
 
 class TestDiff:
-    def test_a_moved_threshold_differs_between_old_and_new_only(self, small, tmp_path):
+    def test_a_moved_threshold_changes_decisions_only_where_it_moved(self, small, tmp_path):
         file = rules_file(tmp_path, MOVED)
         difference = small.diff(
             KnowledgeBase.load(rules=[file], values=FEWER_NUMBERS), max_failed=0
@@ -234,12 +233,16 @@ class TestDiff:
             high[f"{SEARCH}_then_b"]
         ) == {"stays"}
 
-    def test_the_command_takes_ontologies_and_rules(self, command, suave_copy, tmp_path):
+    def test_the_same_ontology_decides_alike(self, command, suave_copy):
         same = suave_copy()
         status, text, _ = command("diff", same, same, "--max-failed", "0")
         assert (status, text) == (0, "0 of 288 states are decided differently\n")
+
+    def test_the_command_takes_rules_for_the_knowledge_base_with_them(
+        self, command, suave_copy, tmp_path
+    ):
         file = rules_file(tmp_path, MOVED)
-        _, text, _ = command("diff", same, file, "--max-failed", "0")
+        _, text, _ = command("diff", suave_copy(), file, "--max-failed", "0")
         assert (
             f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n"
             in text
@@ -296,7 +299,7 @@ def own_table(tmp_path):
     return file
 
 
-def test_a_knowledge_base_and_its_own_table_decide_alike(own_table, command):
+def test_a_table_of_a_knowledge_base_decides_as_that_does(own_table, command):
     status, text, _ = command("diff", "suave.owl", own_table, "--max-failed", "1")
     assert (status, text) == (0, "0 of 3744 states are decided differently\n")
 

@@ -111,6 +111,11 @@ def refused(command, name, arguments, said):
             ("infer", "--at", "f_maintain_motion=IN_ERROR_\udcff"),  # as the shell's $'\xff' comes
             "--at: f_maintain_motion: 'IN_ERROR_\\udcff' has a character that no file can hold",
         ),
+        (
+            ("infer", "--at", "c_thruster_1=BROKEN"),
+            "no rule mentions the c_status 'BROKEN'",
+        ),
+        (("why-not", "S1a", "--at", "water_visibilty=3.4"), "did you mean 'water_visibility'"),
         (("infer", "--at", "nowhere@3"), "nowhere: no such folder"),
         (("infer", "--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
         (("infer", "--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),

@@ -7,13 +7,14 @@ import io
 import json
 import threading
 import time
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
 from suave_des import run_mission
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
@@ -29,10 +30,14 @@ _BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
 EXPLOSION = f"explosion: {_BODY} -> o_updatable(o_generate_search_path, true)\n"
 
 
-def test_infers_the_error_and_plans_the_lower_spiral(knowledge):
-    reasoning = knowledge.infer(knowledge.state(**HIGH))
-    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, reasoning.inference.facts))
-    assert [(each.function, each.design) for each in reasoning.plan.decisions] == [
+def test_an_error_is_inferred(knowledge):
+    facts = knowledge.infer(knowledge.state(**HIGH)).inference.facts
+    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, facts))
+
+
+def test_a_lower_spiral_is_planned(knowledge):
+    plan = knowledge.infer(knowledge.state(**HIGH)).plan
+    assert [(each.function, each.design) for each in plan.decisions] == [
         ("f_generate_search_path", "fd_spiral_low")
     ]
 
@@ -70,7 +75,8 @@ def test_without_objectives_the_search_task_s_are_asked_for(knowledge):
     )
 
 
-def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
+@pytest.fixture
+def state_file(tmp_path) -> Path:
     file = tmp_path / "state.yaml"
     file.write_text(
         "objectives: [f_generate_search_path]\n"
@@ -78,45 +84,18 @@ def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
         "components: {c_thruster_1: FALSE}\n"  # YAML's own false
         "measurements: {water_visibility: 1.8}\n"
     )
-    assert knowledge.state(file).components == (("c_thruster_1", "FALSE"),)
-    state = knowledge.state(
-        file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"}
-    )
+    return file
+
+
+def test_the_false_of_yaml_is_a_status_like_any_other(knowledge, state_file):
+    assert knowledge.state(state_file).components == (("c_thruster_1", "FALSE"),)
+
+
+def test_words_win_over_the_file_that_they_complete(knowledge, state_file):
+    words = {"water_visibility": 3.0}, {"c_thruster_1": "RECOVERED"}
+    state = knowledge.state(state_file, measurements=words[0], components=words[1])
     assert str(dict(state.measurements)["water_visibility"]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            "measurements: {water_visibilty: 1}\n",
-            "line 1, measurements.water_visibilty: there is no quality attribute",
-        ),
-        (
-            "measurements:\n  water_visibility: deep\n",
-            "line 2, measurements.water_visibility: 'deep' is not a number",
-        ),
-        (
-            "groundings: {f_maintain_motion: fd_spiral_low}\n",
-            "f_maintain_motion has no function design",
-        ),
-        (
-            "components: {c_thruster_1: recoverd}\n",
-            "no rule mentions the c_status 'recoverd' (did you mean 'REC",
-        ),
-        ("component: {}\n", "did you mean 'components'"),
-        ("components: 3\n", "line 1, components: "),
-        ("", "is empty"),
-    ],
-)
-def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
-    file = tmp_path / "state.yaml"
-    file.write_text(text)
-    with pytest.raises(InputError) as error:
-        knowledge.state(file)
-    assert said in str(error.value)
-    assert str(file) in str(error.value)
 
 
 def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
@@ -154,7 +133,9 @@ def test_a_contradiction_shows_no_text_as_such(tmp_path):
 
 
 class TestTimeLimit:
-    def test_names_the_state_that_takes_too_long_and_refuses_more(self, knowledge, monkeypatch):
+    @pytest.fixture
+    def given_up(self, knowledge, monkeypatch) -> Iterator[tuple[Reasoner, KnowledgeError]]:
+        """A reasoner that takes too long for a state, and what is told of it."""
         monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
         released = threading.Event()
         monkeypatch.setattr(
@@ -164,13 +145,19 @@ class TestTimeLimit:
         limit = TimeLimit()
         reasoner = Reasoner(knowledge.base, "pellet", limit)
         limit.seconds = 0.05
-        with pytest.raises(
-            KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after "
-        ):
+        with pytest.raises(KnowledgeError) as error:
             reasoner.analyze(knowledge.state(**HIGH))
+        yield reasoner, error.value
+        released.set()
+
+    def test_names_the_state_that_takes_too_long(self, given_up):
+        _, error = given_up
+        assert "fd_spiral_high, water_visibility = 1.8: not done after " in str(error)
+
+    def test_names_what_the_reasoner_still_does_when_it_refuses_more(self, given_up, knowledge):
+        reasoner, _ = given_up
         with pytest.raises(KnowledgeError, match="still reasoning"):
             reasoner.analyze(knowledge.state())
-        released.set()
 
     @pytest.mark.parametrize("reasoner", ["cached", "owlready2"])
     def test_holds_for_a_mission_too(self, tmp_path, reasoner):
@@ -344,33 +331,6 @@ def test_the_command_notes_unknown_names_on_its_error_stream(command):
         noted
         == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("SELECT WHERE", "not a SPARQL query"),
-        ("", "not a SPARQL query"),
-        (
-            "SELECT ?s WHERE { ?s nowhere:is ?o }",
-            "not a SPARQL query: Unknown namespace prefix : nowhere",
-        ),
-        ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
-        (
-            "SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }",
-            "SERVICE and FROM read from other sources",
-        ),
-        (
-            "SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }",
-            "SERVICE and FROM read from other sources",
-        ),
-    ],
-)
-def test_what_is_no_query_of_the_knowledge_base_is_refused(knowledge, text, said):
-    with pytest.raises(InputError) as error:
-        knowledge.query(text)
-    assert said in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_the_command_prints_tables(command):

@@ -74,18 +74,24 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     assert all(each.startswith(f"{SEARCH}: no change instead of fd_") for each in lost)
 
 
-def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
-    folder, _ = mission
-    clash = (
-        NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
-    )
-    (trial,) = try_rules(folder, clash)
-    problems = [text for _, kind, text in trial.found if kind == CONTRADICTS]
+CLASH = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
+
+
+@pytest.fixture(scope="module")
+def problems(mission) -> list[str]:
+    """What is told of the states of the mission in which a rule would contradict others."""
+    (trial,) = try_rules(mission[0], CLASH)
+    return [text for _, kind, text in trial.found if kind == CONTRADICTS]
+
+
+def test_rules_that_would_contradict_each_other_are_named(problems):
     assert problems
-    assert all(
-        "by the rules QAWaterVisibility (" in text and ", clash (" in text for text in problems
-    )
-    status, text, _ = command("try", clash, "--on", folder)
+    for text in problems:
+        assert "by the rules QAWaterVisibility (" in text and ", clash (" in text
+
+
+def test_the_command_counts_the_states_that_would_contradict_themselves(mission, problems, command):
+    status, text, _ = command("try", CLASH, "--on", mission[0])
     assert status == 0
     assert f"states that would contradict themselves: {len(problems)}" in text
 
@@ -164,16 +170,21 @@ def test_a_damaged_record_of_a_campaign_is_reported(tmp_path, command, line, sai
     assert f"knowledge_states.jsonl: {said}" in error
 
 
-def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
-    with pytest.raises(
-        InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"
-    ):
-        list(try_rules(tmp_path, NEAR))
-    (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
-    with pytest.raises(InputError, match=r"mission\.json: no such file"):
-        list(try_rules(tmp_path, NEAR))
-    (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
-    with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
+@pytest.mark.parametrize(
+    ("line", "has_mission", "said"),
+    [
+        (None, False, r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"),
+        ('{"t_s": 1}', False, r"mission\.json: no such file"),
+        ('{"t_s": 1}', True, r"knowledge\.jsonl: line 1: is damaged"),
+    ],
+    ids=["an empty folder", "no mission", "a damaged record"],
+)
+def test_what_is_no_record_of_a_mission_is_reported(mission, tmp_path, line, has_mission, said):
+    if line is not None:
+        (tmp_path / KNOWLEDGE_FILE).write_text(f"{line}\n")
+    if has_mission:
+        (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
+    with pytest.raises(InputError, match=said):
         list(try_rules(tmp_path, NEAR))
 
 

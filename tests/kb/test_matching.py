@@ -253,7 +253,7 @@ def test_those_that_extend_a_binding_are_some_of_them():
     assert matches(PAIR, PAIRS, {"y": ONE}) == BOTH[1:]
 
 
-def test_what_matches_is_nearest_and_nothing_of_it_fails():
+def test_of_a_rule_that_matches_no_atom_fails_in_the_nearest_match():
     assert matching.nearest_match(PAIR, PAIRS) == (BOTH[0], ())
 
 

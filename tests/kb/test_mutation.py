@@ -6,12 +6,14 @@ import random
 from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
 
 from suave_des import run_mission
 from suave_des.kb import adequacy
 from suave_des.kb.adequacy import (
+    Coverage,
     Goal,
     Mutant,
     is_horn,
@@ -26,6 +28,7 @@ from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
 from suave_des.kb.situations import Situation, difference
 from suave_des.kb.space import PolicySpace, States
 from suave_des.knowledge.ontology import Ontology
+from tests.helpers.command import command_here
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, individual
 
@@ -169,17 +172,23 @@ EQUIVALENT_ONES = {
 }
 
 
+@pytest.fixture(scope="module")
+def equivalent(tmp_path_factory: pytest.TempPathFactory, small) -> list[Mutant]:
+    """The mutants of QAWaterVisibility that are proved equivalent."""
+    of_rule = [each for each in mutants_of(small.base) if each.name == "QAWaterVisibility"]
+    tests = read_tests(tmp_path_factory.mktemp("equivalent"), small, NOTHING_WRONG)
+    results, _ = mutate(small, tests, of_rule, max_failed=1)
+    return [each.mutant for each in results if each.result == adequacy.EQUIVALENT]
+
+
 @pytest.mark.slow
-def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_random_states(
-    tmp_path, small
-):
-    knowledge = small
-    of_rule = [each for each in mutants_of(knowledge.base) if each.name == "QAWaterVisibility"]
-    results, _ = mutate(
-        knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), of_rule, max_failed=1
-    )
-    equivalent = [each.mutant for each in results if each.result == adequacy.EQUIVALENT]
+def test_mutants_that_are_known_to_be_equivalent_are_proved_so(equivalent):
     assert set(map(str, equivalent)) == EQUIVALENT_ONES
+
+
+@pytest.mark.slow
+def test_equivalent_mutants_infer_the_same_in_random_states(equivalent, small):
+    knowledge = small
     draw = random.Random(7)
     space = PolicySpace.of(knowledge.base, knowledge.settings)
     every = list(States.of(knowledge.base, knowledge.settings, 1, space))
@@ -190,6 +199,7 @@ def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_ra
         )
         for state in draw.sample(every, 50)
     ]
+    assert equivalent
     for each in equivalent:
         changed = knowledge.changed(each.applied(knowledge.base))
         for state in states:
@@ -199,32 +209,42 @@ def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_ra
             )
 
 
-def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(tmp_path, knowledge):
-    given = f"given: {{groundings: {{{SEARCH}: fd_spiral_low}}, measurements: {{water_visibility: 2.0}}}}"
-    text = "tests:\n" + "".join(
-        f"- name: {wanted}\n  {given}\n  decides: {{{SEARCH}: {wanted}}}\n"
-        for wanted in ("stays", "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high", "none left")
-    )
-    low = f"given: {{groundings: {{{SEARCH}: fd_spiral_high}}, measurements: {{water_visibility: 2.0}}}}"
-    text += f'- name: not\n  {low}\n  follows_not: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]\n'
-    text += f'- name: does\n  {low}\n  follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]\n'
-    text += f"- name: replaced\n  {low}\n  decides: {{{SEARCH}: fd_spiral_high}}\n"
-    text += f"- name: asserted\n  {low}\n  follows_not: [FunctionGrounding(fg_spiral_high)]\n"
-    passed = {
-        test.name: run_test(knowledge, test).passed
-        for test in read_tests(tmp_path, knowledge, text)
-    }
-    assert passed == {
-        "stays": True,
-        "fd_spiral_low": True,
-        "fd_spiral_medium": False,
-        "fd_spiral_high": False,
-        "none left": False,
-        "not": False,
-        "does": True,
-        "replaced": False,
-        "asserted": False,
-    }
+LOW_STAYS, HIGH_FALLS = (
+    f"given: {{groundings: {{{SEARCH}: {design}}}, measurements: {{water_visibility: 2.0}}}}"
+    for design in ("fd_spiral_low", "fd_spiral_high")
+)
+IN_ERROR = '["fg_status(fg_spiral_high, IN_ERROR_NFR)"]'
+
+
+@pytest.mark.parametrize(
+    ("given", "expected", "passes"),
+    [
+        (LOW_STAYS, f"decides: {{{SEARCH}: stays}}", True),
+        (LOW_STAYS, f"decides: {{{SEARCH}: fd_spiral_low}}", True),
+        (LOW_STAYS, f"decides: {{{SEARCH}: fd_spiral_medium}}", False),
+        (LOW_STAYS, f"decides: {{{SEARCH}: fd_spiral_high}}", False),
+        (LOW_STAYS, f"decides: {{{SEARCH}: none left}}", False),
+        (HIGH_FALLS, f"follows_not: {IN_ERROR}", False),
+        (HIGH_FALLS, f"follows: {IN_ERROR}", True),
+        (HIGH_FALLS, f"decides: {{{SEARCH}: fd_spiral_high}}", False),
+        (HIGH_FALLS, "follows_not: [FunctionGrounding(fg_spiral_high)]", False),
+    ],
+    ids=[
+        "stays",
+        "the present design",
+        "another design",
+        "a higher design",
+        "none left",
+        "a fact that follows is not absent",
+        "a fact that follows",
+        "the design that is replaced",
+        "a fact of the state is not absent",
+    ],
+)
+def test_a_test_passes_if_all_is_as_it_expects(tmp_path, knowledge, given, expected, passes):
+    text = f"tests:\n- name: it\n  {given}\n  {expected}\n"
+    (test,) = read_tests(tmp_path, knowledge, text)
+    assert run_test(knowledge, test).passed is passes
 
 
 def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path):
@@ -321,47 +341,81 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
         assert difference(small.outcome(situation), changed.outcome(situation)) == found.reason
 
 
-@pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_coverage_names_what_is_missing_and_states_for_it(tmp_path, knowledge, all_rules):
-    tests = read_tests(tmp_path, knowledge, LOW_AND_HIGH)
-    if not all_rules:  # what fires depends on these two alone
-        others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
-        knowledge = KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
-    situations = [situation for test in tests for situation in test.situations]
-    counted: list[tuple[int, int]] = []
+@pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.slow)])
+def base(request: pytest.FixtureRequest, knowledge) -> KnowledgeBase:
+    if request.param:
+        return knowledge
+    # what fires depends on these two alone
+    others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
+    return KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
+
+
+@pytest.fixture(scope="module")
+def situations(tmp_path_factory, knowledge) -> list[Situation]:
+    tests = read_tests(tmp_path_factory.mktemp("coverage"), knowledge, LOW_AND_HIGH)
+    return [situation for test in tests for situation in test.situations]
+
+
+@pytest.fixture(scope="module")
+def counted(base, situations) -> tuple[Coverage, list[tuple[int, int]]]:
+    """The coverage, and the counts that were told while it was measured."""
+    counts: list[tuple[int, int]] = []
     coverage = measure_coverage(
-        knowledge, situations, max_failed=0, on_count=lambda *count: counted.append(count)
+        base, situations, max_failed=0, on_count=lambda *count: counts.append(count)
     )
-    states = len(counted)
-    assert states > 10 and counted == [(number, states) for number in range(states)]
-    fired, not_fired = (
-        Goal("QAWaterVisibility", -1, outcome) for outcome in (adequacy.FIRES, adequacy.FIRES_NOT)
-    )
-    assert (coverage.covered[fired], coverage.covered[not_fired]) == (1, 1)
-    assert "equal" in {
-        goal.outcome for goal in coverage.missing if goal.rule == "QAWaterVisibility"
-    }
-    fires = Goal("S10", -1, adequacy.FIRES)
-    assert fires not in coverage.missing and fires not in coverage.covered
-    proposed = [Situation(state) for state, _ in coverage.proposed]
-    assert not measure_coverage(knowledge, [*situations, *proposed], max_failed=0).missing
+    return coverage, counts
 
 
-def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path, command, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "flown")
-    status, out, _ = command(
-        "test", "--from-mission", tmp_path / "flown", "--write", tmp_path / "flown.yaml"
-    )
-    assert status == 0
-    assert "tests are in" in out
-    status, out, _ = command("test", tmp_path / "flown.yaml")
-    assert status == 0
-    text = (tmp_path / "flown.yaml").read_text(encoding="utf-8")
-    (tmp_path / "flown.yaml").write_text(
-        text.replace("fd_spiral_low, f_m", "fd_spiral_high, f_m"), encoding="utf-8"
-    )
-    assert command("test", tmp_path / "flown.yaml")[0] == 1
+class TestCoverage:
+    """What tests of one rule cover, and what is proposed to cover the rest."""
+
+    def test_each_state_is_counted_while_it_is_measured(self, counted):
+        counts, states = counted[1], len(counted[1])
+        assert states > 10 and counts == [(number, states) for number in range(states)]
+
+    @pytest.mark.parametrize("outcome", [adequacy.FIRES, adequacy.FIRES_NOT])
+    def test_a_rule_is_covered_by_the_test_in_which_it_fires_or_does_not(self, counted, outcome):
+        assert counted[0].covered[Goal("QAWaterVisibility", -1, outcome)] == 1
+
+    def test_a_value_on_the_threshold_is_missing(self, counted):
+        missing = counted[0].missing
+        assert "equal" in {goal.outcome for goal in missing if goal.rule == "QAWaterVisibility"}
+
+    def test_a_rule_that_fires_in_no_state_is_neither_missing_nor_covered(self, counted):
+        fires = Goal("S10", -1, adequacy.FIRES)
+        assert fires not in counted[0].missing and fires not in counted[0].covered
+
+    def test_with_the_proposed_states_nothing_is_missing(self, base, situations, counted):
+        proposed = [Situation(state) for state, _ in counted[0].proposed]
+        assert not measure_coverage(base, [*situations, *proposed], max_failed=0).missing
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, CompletedProcess[str]]:
+    """A folder with tests of a recorded mission, and what the command that wrote them printed."""
+    folder = tmp_path_factory.mktemp("recorded")
+    run_mission("seams2023", "metacontrol", 1, 1, folder / "flown")
+    words = ("kb", "test", "--from-mission", "flown", "--write", "flown.yaml")
+    return folder, command_here(*words, cwd=folder)
+
+
+def test_the_command_says_where_the_tests_of_a_recorded_mission_are(recorded):
+    _, ended = recorded
+    assert (ended.returncode, "tests are in" in ended.stdout) == (0, True)
+
+
+def test_decisions_of_a_recorded_mission_are_tests_that_pass(recorded):
+    folder, _ = recorded
+    assert command_here("kb", "test", "flown.yaml", cwd=folder).returncode == 0
+
+
+def test_another_decision_than_that_of_the_recorded_mission_fails(recorded):
+    folder, _ = recorded
+    text = (folder / "flown.yaml").read_text(encoding="utf-8")
+    changed = text.replace("fd_spiral_low, f_m", "fd_spiral_high, f_m")
+    assert changed != text
+    (folder / "changed.yaml").write_text(changed, encoding="utf-8")
+    assert command_here("kb", "test", "changed.yaml", cwd=folder).returncode == 1
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.errors import InputError
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, _spans, function_table
 from suave_des.kb.scale import Scale
@@ -50,7 +49,7 @@ def policy(knowledge):
 
 
 class TestScale:
-    def test_places_follow_one_another_and_have_a_value_of_their_own(self):
+    def test_places_follow_one_another(self):
         scale = Scale((Decimal(1), Decimal("2.5")))
         assert list(map(scale.text, range(len(scale)))) == [
             "not measured",
@@ -60,19 +59,17 @@ class TestScale:
             "2.5",
             "> 2.5",
         ]
-        values = list(map(scale.value, range(len(scale))))
-        assert values[0] is None
-        assert (
-            Decimal(0)
-            < values[1]
-            < values[2]
-            == 1
-            < values[3]
-            < values[4]
-            == Decimal("2.5")
-            < values[5]
-        )
-        assert scale.value(1) < scale.value(1, 2, 3) < 1 and scale.value(5, 0, 3) > Decimal("2.5")
+
+    def test_a_place_has_a_value_of_its_own(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        unmeasured, *values = map(scale.value, range(len(scale)))
+        assert unmeasured is None
+        assert 0 < values[0] < values[1] == 1 < values[2] < values[3] == Decimal("2.5") < values[4]
+
+    def test_an_open_range_has_several_values_in_their_order(self):
+        scale = Scale((Decimal(1), Decimal("2.5")))
+        assert scale.value(1) < scale.value(1, 2, 3) < 1
+        assert scale.value(5, 0, 3) > Decimal("2.5")
 
     def test_neighbours_are_told_as_one_range(self):
         scale = Scale((Decimal(1), Decimal("2.5")))
@@ -192,13 +189,6 @@ class TestPolicy:
             PolicySpace.of(KnowledgeBase.load(rules=[file]).base, settings).attributes
             == settings.measured
         )
-
-    def test_too_many_states_are_refused(self, knowledge):
-        many = PolicySpace(
-            ("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ()
-        )
-        with pytest.raises(InputError, match="kinds of states, which is too many"):
-            knowledge.policy(9, space=many)
 
 
 def test_the_csv_file_has_every_cell(command, tmp_path, policy):

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.knowledge.state import KnowledgeState
+from tests.helpers.checks import subject
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 CLASH = (
@@ -111,17 +113,32 @@ def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path
     assert dict(trees[0].bindings)["q"] == "qa_water_visibility_high"
 
 
-class TestDecisions:
-    def test_why_not_names_the_filter_and_how_its_fact_follows(self, knowledge, in_error):
-        (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
-        assert decision[0] == "f_maintain_motion: fd_all_thrusters is left out: not realisable"
-        left_out = decision.index("  fd_all_thrusters: left out: not realisable")
-        assert "[by rule compError with " in decision[left_out + 1]
+@pytest.fixture(scope="module")
+def left_out(knowledge, in_error) -> tuple[str, ...]:
+    (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
+    return decision
 
-    def test_why_tells_the_call_and_every_other_design(self, knowledge, in_error):
-        (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
-        assert decision[1] == "  adapted because" and "[by rule S1b with " in decision[2]
-        assert [line.split(": ")[:2] for line in decision if line.startswith("  fd_")] == [
+
+@pytest.fixture(scope="module")
+def chosen(knowledge, in_error) -> tuple[str, ...]:
+    (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
+    return decision
+
+
+class TestDecisions:
+    def test_why_not_names_the_filter(self, left_out):
+        assert left_out[0] == "f_maintain_motion: fd_all_thrusters is left out: not realisable"
+
+    def test_why_not_tells_how_the_fact_of_the_filter_follows(self, left_out):
+        at = left_out.index("  fd_all_thrusters: left out: not realisable")
+        assert "[by rule compError with " in left_out[at + 1]
+
+    def test_why_tells_what_called_for_the_decision(self, chosen):
+        assert chosen[1] == "  adapted because"
+        assert "[by rule S1b with " in chosen[2]
+
+    def test_why_tells_what_became_of_each_design(self, chosen):
+        assert [line.split(": ")[:2] for line in chosen if line.startswith("  fd_")] == [
             ["  fd_spiral_high", "left out"],
             ["  fd_spiral_low", "chosen"],
             ["  fd_spiral_medium", "left out"],
@@ -152,35 +169,6 @@ class TestDecisions:
         )
 
 
-@pytest.mark.parametrize(
-    ("question", "said"),
-    [
-        (
-            "fg_status(fg_spiral_high, IN_ERROR_FR)",
-            "does not follow in this state (fg_status of fg_spiral_high: IN_E",
-        ),
-        (
-            "fg_status(fg_spiral_hi, IN_ERROR_FR)",
-            "there is no individual 'fg_spiral_hi' (did you mean fg_spiral_high?",
-        ),
-        (
-            "why fd_spiral_lo?",
-            "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'",
-        ),
-        (
-            "fg_statu(fg_spiral_high, IN_ERROR_FR)",
-            "there is no property 'fg_statu' (did you mean fg_status?",
-        ),
-        ("because", "'because' is not a question about a state"),
-        ("fg_status(", "is not a fact"),
-    ],
-)
-def test_a_question_that_has_no_answer_is_told_so(knowledge, in_error, question, said):
-    with pytest.raises(InputError) as error:
-        knowledge.explain(in_error, question)
-    assert said in str(error.value)
-
-
 def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowledge):
     """No thruster is required by fd_spiral_high: whether one has failed does not matter."""
     with pytest.raises(
@@ -200,19 +188,26 @@ def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(knowledge
     assert "does not hold: found 3.5 (?measured), needed less than 3.25" in error
 
 
-def test_a_contradiction_names_the_rules(tmp_path):
-    rules = tmp_path / "clash.swrl"
+@pytest.fixture(scope="module")
+def clashing(tmp_path_factory: pytest.TempPathFactory) -> KnowledgeBase:
+    rules = tmp_path_factory.mktemp("clash") / "clash.swrl"
     rules.write_text(CLASH)
-    knowledge = KnowledgeBase.load(rules=[rules])
-    state = knowledge.state(
-        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8}
+    return KnowledgeBase.load(rules=[rules])
+
+
+def measured(knowledge: KnowledgeBase, visibility: float) -> KnowledgeState:
+    return knowledge.state(
+        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": visibility}
     )
+
+
+def test_a_contradiction_names_the_rules(clashing):
     with pytest.raises(KnowledgeError, match=r"by the rules QAWaterVisibility \(.*, clash \("):
-        knowledge.explain(state)
-    above = knowledge.state(
-        groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2}
-    )
-    assert knowledge.explain(above).facts
+        clashing.explain(measured(clashing, 1.8))
+
+
+def test_a_state_in_which_rules_do_not_clash_is_explained(clashing):
+    assert clashing.explain(measured(clashing, 2)).facts
 
 
 SCHEMA = """
@@ -235,20 +230,40 @@ SCHEMA = """
 """
 
 
-def test_what_axioms_conclude_is_explained_inferred_and_queried(suave_copy):
-    knowledge = KnowledgeBase.load(suave_copy(SCHEMA))
-    state = knowledge.state(components={"c_thruster_3": "FALSE"})
-    inferred = {str(fact) for fact in knowledge.infer(state).inference.facts}
-    wanted = ["FailedComponent(c_thruster_3)", "partOf(motor, hull)", "hasPart(hull, motor)"]
-    assert inferred.issuperset(wanted)
-    for fact in wanted:
-        (derivation,) = knowledge.explain(state, fact).facts
-        assert derivation.source == "axioms"
-        assert derivation.axioms
+CONCLUDED = ["FailedComponent(c_thruster_3)", "partOf(motor, hull)", "hasPart(hull, motor)"]
+
+
+@pytest.fixture(scope="module")
+def by_axioms(tmp_path_factory: pytest.TempPathFactory) -> tuple[KnowledgeBase, KnowledgeState]:
+    """A knowledge base in which axioms conclude something, and a state for it."""
+    given = subject(tmp_path_factory.mktemp("axioms"), extra=SCHEMA)
+    knowledge = KnowledgeBase.load(given.ontologies)
+    return knowledge, knowledge.state(components={"c_thruster_3": "FALSE"})
+
+
+def test_what_axioms_conclude_is_inferred(by_axioms):
+    knowledge, state = by_axioms
+    assert set(map(str, knowledge.infer(state).inference.facts)).issuperset(CONCLUDED)
+
+
+@pytest.mark.parametrize("fact", CONCLUDED)
+def test_what_axioms_conclude_is_explained(by_axioms, fact):
+    knowledge, state = by_axioms
+    (derivation,) = knowledge.explain(state, fact).facts
+    assert derivation.source == "axioms"
+    assert derivation.axioms
+
+
+def test_what_axioms_conclude_is_queried(by_axioms):
+    knowledge, state = by_axioms
     result = knowledge.query(
         "SELECT ?p WHERE { suave:hull suave:hasPart ?p }", state, inferred=True
     )
     assert result.rows == (("suave:c_thruster_1",), ("suave:motor",))
+
+
+def test_decisions_do_not_depend_on_whether_all_is_inferred(by_axioms):
+    knowledge, state = by_axioms
     assert knowledge.decide(state).plan == knowledge.infer(state).plan
 
 

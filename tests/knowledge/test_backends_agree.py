@@ -254,7 +254,7 @@ class TestSchemas:
         return found
 
     def test_all_that_axioms_conclude_is_read(self, tmp_path):
-        assert sum(map(len, self.compare(range(200, 204), tmp_path))) >= 50
+        assert sum(map(len, self.compare(range(200, 203), tmp_path))) >= 30
 
     @pytest.mark.slow
     def test_all_that_axioms_conclude_is_read_in_many_ontologies(self, tmp_path):

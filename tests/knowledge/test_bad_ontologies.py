@@ -104,16 +104,6 @@ def test_a_bad_file_is_told_with_its_place(tmp_path, name):
     assert expected in problem
 
 
-def test_a_missing_file_a_folder_and_bytes_are_reported(tmp_path):
-    assert "no such file" in problem_of(lambda: Ontology.load([tmp_path / "none.owl"]))
-    assert "is a folder" in problem_of(lambda: Ontology.load([tmp_path]))
-    path = tmp_path / "bytes.owl"
-    path.write_bytes(b"\x00\xff\xfe\x01" * 50)
-    assert "not text in utf-8" in problem_of(lambda: Ontology.load([path]))
-    locked = tmp_path / "none.owl" / "suave.owl"
-    assert "no such file" in problem_of(lambda: Ontology.load([locked]))
-
-
 def test_simple_entities_as_protege_writes_them_are_read(suave_copy, kb):
     entities = (
         '<?xml version="1.0"?>\n<!DOCTYPE rdf:RDF [\n<!ENTITY suave "http://www.metacontrol.org/suave#" >\n'
@@ -154,18 +144,6 @@ def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy, value, datatyp
     )
     subject = Subject([path], reaction_thresholds_m=(3.25, 2.25, 1.25))
     assert only(findings_of(subject), "is not an xsd:decimal").line == line
-
-
-def test_an_unknown_operator_is_reported(suave_copy):
-    path = suave_copy(individual("noise", "QualityAttributeType", ("qa_comparison_operator", "=<")))
-    assert "qa_comparison_operator '=<' is unknown (one of < <= > >=)" in problem_of(
-        lambda: Ontology.load([path])
-    )
-
-
-def test_two_things_of_one_kind_and_name_are_reported(suave_copy):
-    path = suave_copy(individual("mros:fd_spiral_low", "FunctionDesign"))
-    assert "two function designs have this name" in problem_of(lambda: Ontology.load([path]))
 
 
 def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy):

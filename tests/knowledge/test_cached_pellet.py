@@ -148,7 +148,7 @@ def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> Knowledge
 @pytest.mark.parametrize("name", ONTOLOGIES)
 @settings(max_examples=25)
 @given(data=st.data(), seed=st.integers(0, 2**32))
-def test_cached_pellet_and_pellet_agree_around_thresholds(name, data, seed):
+def test_cached_pellet_agrees_with_pellet_around_thresholds(name, data, seed):
     kb, pellet, cached = loaded(name)
     state = data.draw(states(kb))
     assert outcome(cached, state) == outcome(pellet, state)

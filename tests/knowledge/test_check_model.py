@@ -1,12 +1,15 @@
 """kb check: mistakes in the ontology: names, individuals, designs, kinds of things."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from suave_des.errors import Finding, KnowledgeError, Level
 from suave_des.kb.check import check
-from suave_des.knowledge.checks import Subject
+from suave_des.knowledge.checks import Subject, static_findings
+from suave_des.knowledge.resolver import collect
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import REPORTED_STATUSES, open_base, subject_of
@@ -20,6 +23,7 @@ from tests.helpers.checks import (
     individual,
     link,
     only,
+    subject,
     value,
     warnings,
 )
@@ -31,32 +35,61 @@ from tests.helpers.exemplar_files import (
 )
 
 
-def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy, tmp_path):
+def without_shapes(subject: Subject) -> tuple[Finding, ...]:
+    """What is found without checking shapes, which takes a second."""
+    return tuple(static_findings(subject, collect(subject.ontologies)))
+
+
+def test_a_measured_attribute_that_the_ontology_calls_something_else(suave_copy):
     path = suave_copy(replace={'water_visibility"': 'water_visability"'}, name="mine.owl")
-    findings = findings_of(Subject([path], measured=["water_visibility"]))
+    findings = without_shapes(Subject([path], measured=["water_visibility"]))
     unknown = only(findings, "missions measure water_visibility, but no ontology has")
     assert (unknown.level, unknown.file, unknown.remedy) == (
         Level.WARN,
         str(path),
         "did you mean water_visability?",
     )
-    assert not [
-        each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message
-    ]
 
 
-def test_components_that_nothing_reports_and_expectations_that_nothing_measures_are_noted(tmp_path):
+def test_nothing_is_said_of_a_measured_attribute_that_the_ontology_has(tmp_path):
+    findings = without_shapes(subject(tmp_path, measured=["water_visibility"]))
+    assert not [each for each in findings if "measure" in each.message]
+
+
+@pytest.fixture(scope="module")
+def unconnected(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """The shipped ontology with two components of which one has a status."""
     status = (
         '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
     )
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
-    findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=[])
-    notes = [one.message for one in findings if one.level is Level.NOTE and one.line]
-    assert notes[:2] == [
-        "missions do not measure water_visibility, so what designs expect of it is compared with nothing",
-        "nothing in the simulation reports the status of component c_camera, so it has none in missions",
+    return subject(tmp_path_factory.mktemp("unconnected"), extra=extra)
+
+
+@pytest.fixture(scope="module")
+def notes_on_missions(unconnected) -> list[str]:
+    """What is noted of them for missions that measure nothing."""
+    in_missions = replace(unconnected, reported=REPORTED_STATUSES, measured=[])
+    notes = [one for one in without_shapes(in_missions) if one.level is Level.NOTE and one.line]
+    return [one.message for one in notes if "missions" in one.message]
+
+
+def test_an_expectation_that_no_mission_measures_is_noted(notes_on_missions):
+    unmeasured = [each for each in notes_on_missions if "measure" in each]
+    assert unmeasured == [
+        "missions do not measure water_visibility, so what designs expect of it is compared with nothing"
     ]
-    assert not any("missions" in one.message for one in found(tmp_path, extra=extra))
+
+
+def test_a_component_without_a_status_that_nothing_reports_is_noted(notes_on_missions):
+    unreported = [each for each in notes_on_missions if "reports" in each]
+    assert unreported == [
+        "nothing in the simulation reports the status of component c_camera, so it has none in missions"
+    ]
+
+
+def test_without_a_mission_nothing_is_noted_of_missions(unconnected):
+    assert not any("missions" in one.message for one in without_shapes(unconnected))
 
 
 def test_the_model(tmp_path):
@@ -90,19 +123,22 @@ def test_a_number_of_another_datatype_is_an_error_each_but_a_whole_number_is_a_d
     assert told == ["hasValue '1.0' is not an xsd:decimal but an xsd:double"] * doubles
 
 
-def test_a_quality_attribute_that_is_not_declared_or_twice(tmp_path):
+def test_a_quality_attribute_that_is_not_declared_is_an_error(tmp_path):
     measured = individual("qa_current", "QAvalue", link("isQAtype", "water_current"))
-    unknown = only(found(tmp_path, extra=measured), "isQAtype water_current is not defined")
+    findings = without_shapes(subject(tmp_path, extra=measured))
+    unknown = only(findings, "isQAtype water_current is not defined")
     assert (unknown.level, unknown.remedy) == (
         Level.ERROR,
         "declare a QualityAttributeType of this name",
     )
+
+
+def test_a_quality_attribute_that_is_declared_twice_is_a_warning(tmp_path):
     twice = '<owl:NamedIndividual rdf:about="http://ros/mros#performance">'
     twice += f'<rdf:type rdf:resource="{TOMASYS}QualityAttributeType"/></owl:NamedIndividual>'
-    again = only(
-        found(tmp_path, extra=twice), "declares the quality attribute type performance, and so does"
-    )
-    assert again.level is Level.WARN
+    findings = without_shapes(subject(tmp_path, extra=twice))
+    said = "declares the quality attribute type performance, and so does"
+    assert only(findings, said).level is Level.WARN
 
 
 UNDEFINED = {
@@ -134,7 +170,7 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
     path = tmp_path / "edited.owl"
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     path.write_text(text.replace(right, wrong, 1), encoding="utf-8")
-    error = only(findings_of(Subject([path])), f"{message} is not defined")
+    error = only(without_shapes(Subject([path])), f"{message} is not defined")
     assert (error.level, error.file, error.remedy) == (
         Level.ERROR,
         str(path),
@@ -147,13 +183,16 @@ def test_names_that_individuals_misspell_are_errors(case, tmp_path):
 def test_an_expected_visibility_that_reactions_are_not_judged_by(tmp_path):
     known = {"reaction_thresholds_m": (3.25, 2.0, 1.25)}
     warning = only(
-        found(tmp_path, **known),
+        without_shapes(subject(tmp_path, **known)),
         "fd_spiral_medium expects 2.25 m of visibility, which is not a threshold",
     )
     assert warning.level is Level.WARN
     assert "reaction_metric.visibility_thresholds_m" in str(warning.remedy)
-    (tmp_path / "other").mkdir()
-    assert not [each for each in found(tmp_path / "other") if "of visibility" in each.message]
+
+
+def test_where_reactions_are_not_judged_no_expected_visibility_is_told(tmp_path):
+    findings = without_shapes(subject(tmp_path))
+    assert not [each for each in findings if "of visibility" in each.message]
 
 
 @pytest.mark.parametrize(
@@ -226,19 +265,32 @@ WRONG = {
 }
 
 
+@pytest.fixture(scope="module")
+def edited(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Finding, ...]]:
+    """What is found where missions measure the visibility and components report."""
+
+    def find(extra: str) -> tuple[Finding, ...]:
+        given = {"reported": REPORTED_STATUSES, "measured": ["water_visibility"]}
+        return found(tmp_path_factory.mktemp("edited"), extra=extra, **given)
+
+    return find
+
+
+@pytest.fixture(scope="module")
+def wrong(edited) -> tuple[Finding, ...]:
+    """What is found with all wrong edits: shapes take a second, whatever they are checked of."""
+    return edited("".join(extra for extra, _ in WRONG.values()))
+
+
 @pytest.mark.parametrize("case", WRONG)
-def test_an_edit_that_means_something_else(case, tmp_path):
-    extra, message = WRONG[case]
-    findings = found(
-        tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]
-    )
-    finding = next(each for each in warnings(findings) if each.message.startswith(message))
+def test_an_edit_that_means_something_else(case, wrong):
+    _, message = WRONG[case]
+    finding = next(each for each in warnings(wrong) if each.message.startswith(message))
     assert finding.line is not None
 
 
-@pytest.mark.parametrize(
-    "extra",
-    [
+def test_right_edits(edited):
+    right = (
         individual("c_thruster_7", "Component", same("c_thruster_1")),
         subclass("SearchDesign", "FunctionDesign"),
         subclass("fd_quick", "FunctionDesign")
@@ -248,35 +300,34 @@ def test_an_edit_that_means_something_else(case, tmp_path):
         )
         + ESTIMATE,
         individual("fd_spiral_low", inside="<rdfs:comment>no facts</rdfs:comment>"),
-        individual("c_thruster_1", inside=value("c_status", "FALSE", "string")),
-        individual("c_thruster_1", inside=value("c_status", "worn", "string")),
+        individual("c_thruster_2", inside=value("c_status", "FALSE", "string")),
+        individual("c_thruster_3", inside=value("c_status", "worn", "string")),
         individual(
             "obs_water_visibility",
             "QAvalue",
             link("isQAtype", "water_visibility") + value("hasValue", "2.5"),
         ),
-    ],
-)
-def test_right_edits(extra, tmp_path):
-    assert not warnings(
-        found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
     )
+    assert warnings(edited("".join(right))) == []
 
 
-def test_a_comparison_operator_with_and_without_its_datatype(tmp_path):
-    def problems(operator: str) -> list[Finding]:
-        return errors(
-            found(tmp_path, extra=individual("current", "QualityAttributeType", operator))
-        )
-
-    assert not problems(value("qa_comparison_operator", "&gt;=", "string"))
-    assert not problems("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>")
-    assert problems(value("qa_comparison_operator", "==", "string"))
+@pytest.mark.parametrize(
+    ("operator", "is_unknown"),
+    [
+        (value("qa_comparison_operator", "&gt;=", "string"), False),
+        ("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>", False),
+        (value("qa_comparison_operator", "==", "string"), True),
+    ],
+    ids=["with its datatype", "without", "unknown"],
+)
+def test_an_unknown_comparison_operator_is_an_error(tmp_path, operator, is_unknown):
+    extra = individual("current", "QualityAttributeType", operator)
+    assert bool(errors(found(tmp_path, extra=extra))) is is_unknown
 
 
 def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path):
     files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
-    note = only(findings_of(Subject(files, operators={"water_visibility": "<"})), "comparison")
+    note = only(without_shapes(Subject(files, operators={"water_visibility": "<"})), "comparison")
     line = next(
         n
         for n, text in enumerate(files[0].read_text().splitlines(), 1)
@@ -287,6 +338,10 @@ def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note
         "water_visibility has no qa_comparison_operator in the ontologies: < is assumed"
         in note.message
     )
+
+
+def test_a_comparison_operator_that_nothing_assumes_is_missing(tmp_path):
+    files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
     (warning,) = warnings(findings_of(Subject(files, measured=["water_visibility"])))
     assert "has no qa_comparison_operator" in warning.message
 

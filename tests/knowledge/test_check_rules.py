@@ -17,6 +17,13 @@ from tests.helpers.checks import (
     only,
 )
 
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One for all tests, which are about rules: shapes of the same file are checked once."""
+    return tmp_path_factory.mktemp("checked")
+
+
 DECLARE = "declare it as {} property in the ontology"
 
 
@@ -34,10 +41,10 @@ SILENT = {
 
 
 @pytest.mark.parametrize("case", SILENT)
-def test_silent_cases_are_errors_with_file_rule_and_column(case, tmp_path):
+def test_what_pellet_is_silent_about_is_an_error_with_its_place(case, folder):
     rule, column, remedy = SILENT[case]
-    (error,) = errors(found(tmp_path, f"# first line\n{rule}\n"))
-    assert (error.file, error.line, error.column) == (str(tmp_path / "mine.swrl"), 2, column)
+    (error,) = errors(found(folder, f"# first line\n{rule}\n"))
+    assert (error.file, error.line, error.column) == (str(folder / "mine.swrl"), 2, column)
     assert error.rule == ("A" if case != "syntax" else None)
     assert error.remedy == remedy
 
@@ -57,12 +64,12 @@ OWL_RULE = f"""
 """
 
 
-def test_rules_of_ontologies_are_checked_likewise(tmp_path):
-    findings = errors(found(tmp_path, extra=OWL_RULE))
-    text = (tmp_path / "suave.owl").read_text(encoding="utf-8")
+def test_rules_of_ontologies_are_checked_likewise(folder):
+    findings = errors(found(folder, extra=OWL_RULE))
+    text = (folder / "suave.owl").read_text(encoding="utf-8")
     line = text[: text.index("mine</rdfs:label>")].count("\n") + 1
     assert {(one.file, one.line, one.rule) for one in findings} == {
-        (str(tmp_path / "suave.owl"), line, "mine")
+        (str(folder / "suave.owl"), line, "mine")
     }
     assert sorted(one.message for one in findings) == [
         "?z occurs in the head, but the body does not bind it",
@@ -70,7 +77,7 @@ def test_rules_of_ontologies_are_checked_likewise(tmp_path):
     ]
 
 
-def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path):
+def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(folder):
     decimal = "http://www.w3.org/2001/XMLSchema#decimal"
     atom = (
         f'<swrl:DatavaluedPropertyAtom><swrl:propertyPredicate rdf:resource="{TOMASYS}hasValue"/>'
@@ -78,13 +85,13 @@ def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path):
         f'<swrl:argument2 rdf:datatype="{decimal}">1,5</swrl:argument2></swrl:DatavaluedPropertyAtom></swrl:body>'
     )
     rule = OWL_RULE.replace("</swrl:body>", atom).replace("Roel", "Role")
-    error = only(found(tmp_path, extra=rule), "'1,5' is not an xsd:decimal")
+    error = only(found(folder, extra=rule), "'1,5' is not an xsd:decimal")
     assert (error.level, error.rule) == (Level.ERROR, "mine")
 
 
-def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path):
+def test_all_mistakes_of_a_file_are_reported_at_once(folder):
     rules = "A: Rle(?x) -> Role(?x)\nB: Role(?x -> Role(?x)\ndisabled C: Role(?x) -> Role(?y)\n"
-    assert [one.line for one in errors(found(tmp_path, rules))] == [1, 2]
+    assert [one.line for one in errors(found(folder, rules))] == [1, 2]
 
 
 TWO_FAILED = (
@@ -92,8 +99,8 @@ TWO_FAILED = (
 )
 
 
-def test_different_names_alone_do_not_make_individuals_different(tmp_path):
-    warning = only(found(tmp_path, TWO_FAILED), "differentFrom(?a, ?b)")
+def test_different_names_alone_do_not_make_individuals_different(folder):
+    warning = only(found(folder, TWO_FAILED), "differentFrom(?a, ?b)")
     assert (warning.level, warning.rule, warning.column) == (Level.WARN, "two", 54)
     assert "owl:AllDifferent" in str(warning.remedy)
 
@@ -111,43 +118,41 @@ def test_different_names_alone_do_not_make_individuals_different(tmp_path):
     ],
     ids=["all different", "different from", "disjoint classes"],
 )
-def test_individuals_that_are_declared_different(tmp_path, axiom):
+def test_individuals_that_are_declared_different(folder, axiom):
     assert not [
-        each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message
+        each for each in found(folder, TWO_FAILED, axiom) if "differentFrom" in each.message
     ]
 
 
-def test_a_rule_may_conclude_that_individuals_are_different(tmp_path):
+def test_a_rule_may_conclude_that_individuals_are_different(folder):
     concluding = (
         'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
     )
     assert not [
-        each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)
+        each for each in found(folder, TWO_FAILED + concluding) if "declare" in str(each.remedy)
     ]
 
 
-def test_a_rule_that_never_fires(tmp_path):
+def test_a_rule_that_never_fires(folder):
     rules = "A: requiresO(?g, ?o) -> Role(?g)\nB: Role(?g) -> Binding(?g)\n"
     rules += 'C: c_status(?c, "ANYTHING") -> Binding(?c)\n'
-    findings = [
-        one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")
-    ]
+    findings = [one for one in found(folder, rules) if one.file and one.file.endswith("mine.swrl")]
     assert [(one.level, one.rule, one.column) for one in findings] == [
         (Level.WARN, "A", 4),
         (Level.WARN, "B", 4),
     ]
 
 
-def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path):
+def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(folder):
     rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
     finding = only(
-        found(tmp_path, rule.format("battery_level")),
+        found(folder, rule.format("battery_level")),
         "no function design has an estimate of battery_level",
     )
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
-    assert not has_level(found(tmp_path, rule.format("water_visibility")), Level.WARN)
+    assert not has_level(found(folder, rule.format("water_visibility")), Level.WARN)
     given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
-    assert not has_level(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
+    assert not has_level(found(folder, rule.format("battery_level") + given), Level.WARN)
 
 
 @pytest.mark.parametrize(
@@ -161,9 +166,9 @@ def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path):
         ("stuck", None, ""),  # a function of the user's may report it
     ],
 )
-def test_a_component_status_that_nothing_reports(tmp_path, status, level, remedy):
+def test_a_component_status_that_nothing_reports(folder, status, level, remedy):
     rules = f'A: c_status(?c, "{status}") -> Role(?c)\nB: Role(?c) -> c_status(?c, "WORN")\n'
-    findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
+    findings = found(folder, rules, reported=REPORTED_STATUSES)
     named = [
         (one.level, one.rule, one.column, one.remedy)
         for one in findings
@@ -172,22 +177,18 @@ def test_a_component_status_that_nothing_reports(tmp_path, status, level, remedy
     assert named == ([] if level is None else [(level, "A", 17, remedy)])
 
 
-def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path):
-    finding = only(
-        found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in"
-    )
+def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(folder):
+    finding = only(found(folder, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("mros.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
-    findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
+    findings = found(folder, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
     assert not [one for one in findings if "replaces the rule of this name" in one.message]
 
 
-def warned(
-    tmp_path: Path, rule: str, **options: object
-) -> list[tuple[int | None, str, str | None]]:
+def warned(folder: Path, rule: str, **options: object) -> list[tuple[int | None, str, str | None]]:
     """Column, message and remedy of the warnings about a rule."""
-    findings = found(tmp_path, rule, reported=REPORTED_STATUSES, **options)  # type: ignore[arg-type]
+    findings = found(folder, rule, reported=REPORTED_STATUSES, **options)  # type: ignore[arg-type]
     return [
         (one.column, one.message, one.remedy)
         for one in findings
@@ -241,9 +242,9 @@ WITHOUT_FIRING = {
 
 
 @pytest.mark.parametrize("case", WITHOUT_FIRING)
-def test_a_rule_that_cannot_do_what_it_should(case, tmp_path):
+def test_a_rule_that_cannot_do_what_it_should(case, folder):
     rule, finding = WITHOUT_FIRING[case]
-    assert [one[:2] for one in warned(tmp_path, rule, measured=["water_visibility"])] == [finding]
+    assert [one[:2] for one in warned(folder, rule, measured=["water_visibility"])] == [finding]
 
 
 @pytest.mark.parametrize(
@@ -269,8 +270,8 @@ def test_a_rule_that_cannot_do_what_it_should(case, tmp_path):
         "A: solvesO(?g, ?o) ^ typeFD(?g, fd_spiral_low) ^ solvesO(?h, ?p) ^ o_updatable(?p, true) -> Role(?h)",
     ],
 )
-def test_a_rule_that_can(rule, tmp_path):
-    assert not warned(tmp_path, rule, measured=["water_visibility"])
+def test_a_rule_that_can(rule, folder):
+    assert not warned(folder, rule, measured=["water_visibility"])
 
 
 @pytest.mark.parametrize(
@@ -290,21 +291,21 @@ def test_a_rule_that_can(rule, tmp_path):
         ),
     ],
 )
-def test_a_status_outside_its_range_is_reported(rule, level, column, consequence, tmp_path):
-    finding = only(found(tmp_path, rule), "is not among the values of")
+def test_a_status_outside_its_range_is_reported(rule, level, column, consequence, folder):
+    finding = only(found(folder, rule), "is not among the values of")
     assert (finding.level, finding.column) == (level, column)
     assert finding.message.endswith(consequence)
     assert finding.remedy == "did you mean IN_ERROR_NFR?"
 
 
-def test_what_a_rule_concludes_that_nobody_declared_is_a_warning(tmp_path):
+def test_what_a_rule_concludes_that_nobody_declared_is_a_warning(folder):
     rule = 'A: Role(?q) -> <http://x.org/#p>(?q, "x")'
-    finding = only(found(tmp_path, rule), "p is not defined")
+    finding = only(found(folder, rule), "p is not defined")
     assert (finding.level, finding.column) == (Level.WARN, 16)
     assert finding.remedy == DECLARE.format("data")
 
 
-def test_a_variable_that_is_not_declared_is_a_warning_where_pellet_takes_it_for_one(tmp_path):
+def test_a_variable_that_is_not_declared_is_a_warning_where_pellet_takes_it_for_one(folder):
     undeclared = OWL_RULE.replace(
         '<swrl:Variable xmlns:swrl="{SWRL}" rdf:about="urn:swrl:var#y"/>'.replace("{SWRL}", SWRL),
         "",
@@ -314,20 +315,20 @@ def test_a_variable_that_is_not_declared_is_a_warning_where_pellet_takes_it_for_
         .replace("Roel", "Role")
         .replace("var#z", "var#x")
     )
-    finding = only(found(tmp_path, extra=value), "?y is not declared as a variable")
+    finding = only(found(folder, extra=value), "?y is not declared as a variable")
     assert (finding.level, finding.rule) == (Level.WARN, "mine")
 
 
-def test_a_rule_that_another_file_switches_off_is_reported(tmp_path):
+def test_a_rule_that_another_file_switches_off_is_reported(folder):
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
     text = f'disabled {same} -> o_status(?o, "IN_ERROR_COMPONENT")'
-    finding = only(found(tmp_path, text), "replaces the rule of this name in")
+    finding = only(found(folder, text), "replaces the rule of this name in")
     assert (finding.level, finding.rule) == (Level.WARN, "S1a")
 
 
-def test_a_component_status_that_is_no_text_is_not_taken_for_a_misspelt_one(tmp_path):
+def test_a_component_status_that_is_no_text_is_not_taken_for_a_misspelt_one(folder):
     rules = "A: c_status(?c, ?s) ^ equal(?s, false) -> Role(?c)"
-    findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
+    findings = found(folder, rules, reported=REPORTED_STATUSES)
     assert not [one for one in findings if "reports c_status" in one.message]
 
 
@@ -339,27 +340,27 @@ def test_a_component_status_that_is_no_text_is_not_taken_for_a_misspelt_one(tmp_
         ("A: hasValue(?q, ?v) ^ equal(true, ?v) -> Role(?q)", 29),
     ],
 )
-def test_a_number_that_is_compared_with_a_text_is_reported(tmp_path, rule, column):
-    finding = only(found(tmp_path, rule), "never compares with")
+def test_a_number_that_is_compared_with_a_text_is_reported(folder, rule, column):
+    finding = only(found(folder, rule), "never compares with")
     assert (finding.level, finding.column) == (Level.WARN, column)
 
 
-def test_a_pattern_that_java_does_not_take_is_reported(tmp_path):
+def test_a_pattern_that_java_does_not_take_is_reported(folder):
     rules = 'A: c_status(?c, ?s) ^ matches(?s, "[F") -> Role(?c)\nB: c_status(?c, ?s) ^ matches(?s, "\\\\p{Lu}+") -> Role(?c)\n'
-    finding = only(found_by_pellet(tmp_path, rules), "is not a pattern")
+    finding = only(found_by_pellet(folder, rules), "is not a pattern")
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 35)
 
 
-def test_an_ill_formed_literal_in_a_class_expression_is_an_error(tmp_path):
+def test_an_ill_formed_literal_in_a_class_expression_is_an_error(folder):
     expression = f"""<owl:Class rdf:about="{SUAVE}Deep"><owl:equivalentClass><owl:Restriction>
     <owl:onProperty rdf:resource="{TOMASYS}hasValue"/>
     <owl:hasValue rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">1,5</owl:hasValue></owl:Restriction>
     </owl:equivalentClass></owl:Class>"""
-    error = only(found(tmp_path, extra=expression), "'1,5', which is not an xsd:decimal")
+    error = only(found(folder, extra=expression), "'1,5', which is not an xsd:decimal")
     assert error.level is Level.ERROR
 
 
-def test_a_rule_that_asks_for_the_same_with_nothing_but_names_is_reported(tmp_path):
+def test_a_rule_that_asks_for_the_same_with_nothing_but_names_is_reported(folder):
     """isQAtype is a functional object property, by which types can become the same: so not here."""
     rule = "A: Component(?c) ^ sameAs(?c, ?d) -> Role(?d)"
-    assert not [one for one in found(tmp_path, rule) if "sameAs" in one.message]
+    assert not [one for one in found(folder, rule) if "sameAs" in one.message]

@@ -3,14 +3,16 @@ fetched.
 """
 
 import itertools
+from pathlib import Path
 
 import pytest
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.checks import static_findings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.resolver import as_written, collect
-from tests.helpers.checks import found
+from tests.helpers.checks import subject
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 
@@ -54,26 +56,50 @@ def test_the_exemplars_three_files_decide_as_the_shipped_ones(
     assert found[6] == {MOTION: "fd_all_thrusters", SEARCH: "fd_spiral_low"}
 
 
-def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped, tmp_path):
-    files = write_exemplar_files(shipped, tmp_path / "owl")
-    given = [
-        *itertools.permutations(files.values()),
-        (files["suave"],),
-        (files["suave"], files["tomasys"]),
-    ]
-    bases = [Ontology.load(one) for one in given]
-    assert {base.files for base in bases} == {tuple(sorted(files.values()))}
-    assert len({base.content_hash for base in bases}) == 1
+@pytest.fixture(scope="module")
+def exemplar(shipped, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return write_exemplar_files(shipped, tmp_path_factory.mktemp("exemplar") / "owl")
 
 
-def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
-    suave_copy, shipped, tmp_path
-):
+@pytest.fixture(scope="module")
+def all_given(exemplar) -> Ontology:
+    return Ontology.load(list(exemplar.values()))
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3)))[1:])
+def test_the_order_of_files_does_not_matter(exemplar, all_given, order):
+    files = list(exemplar.values())
+    assert Ontology.load([files[place] for place in order]).content_hash == all_given.content_hash
+
+
+@pytest.mark.parametrize("names", [("suave",), ("suave", "tomasys")])
+def test_files_beside_those_given_are_found(exemplar, all_given, names):
+    found = Ontology.load([exemplar[name] for name in names])
+    assert found.files == all_given.files == tuple(sorted(exemplar.values()))
+    assert found.content_hash == all_given.content_hash
+
+
+def test_an_import_that_is_not_beside_is_a_shipped_file(suave_copy, shipped):
     path = suave_copy()
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl", shipped / "mros.owl"}
-    beside = path.with_name("tomasys.owl")
-    beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- beside -->")
-    assert set(Ontology.load([path]).files) == {path, beside, shipped / "mros.owl"}
+
+
+@pytest.fixture
+def beside(suave_copy, shipped) -> tuple[Path, Path]:
+    """A copy of suave.owl, and one of tomasys.owl beside it."""
+    path = suave_copy()
+    imported = path.with_name("tomasys.owl")
+    imported.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- beside -->")
+    return path, imported
+
+
+def test_a_file_beside_wins_over_the_shipped_one(beside, shipped):
+    path, imported = beside
+    assert set(Ontology.load([path]).files) == {path, imported, shipped / "mros.owl"}
+
+
+def test_a_given_file_wins_over_the_one_beside(beside, shipped, tmp_path):
+    path, _ = beside
     given = tmp_path / "elsewhere" / "tomasys.owl"
     given.parent.mkdir()
     given.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- given -->")
@@ -94,15 +120,6 @@ def test_known_iris_resolve_to_the_shipped_files(suave_copy, shipped, iri):
     assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl", shipped / "mros.owl"}
 
 
-def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy):
-    path = suave_copy(replace={IMPORT: "http://example.org/wind.owl"})
-    with pytest.raises(KnowledgeError) as error:
-        Ontology.load([path])
-    assert str(error.value).startswith(
-        f"{path}: line 15: import http://example.org/wind.owl does not resolve"
-    )
-
-
 def test_import_cycles_end(suave_copy, shipped, kb):
     path = suave_copy()
     text = (shipped / "tomasys.owl").read_text(encoding="utf-8")
@@ -114,13 +131,9 @@ def test_import_cycles_end(suave_copy, shipped, kb):
         assert len(Ontology.load([path.with_name(name)]).rules) == len(kb.rules)
 
 
-def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(
-    suave_copy, shipped
-):
+def test_a_file_given_twice_counts_once(suave_copy):
     path = suave_copy("<!-- mine -->")
     assert set(Ontology.load([path, path, path.parent / "." / path.name]).files) >= {path}
-    with pytest.raises(KnowledgeError, match="supplies the ontology"):
-        Ontology.load([path, shipped / "suave.owl"])
 
 
 def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path, shipped):
@@ -196,19 +209,27 @@ def test_relative_paths_are_relative_to_the_file(tmp_path):
     assert reasons(app)["app.owl", iri] == (lib, "by its path")
 
 
-@pytest.mark.parametrize("ending", ["owl", "ttl"])
-def test_relative_paths_may_climb_and_end_in_a_mark(tmp_path, ending):
-    """A shared folder of ontologies beside that of the model."""
-    relative = f"../my%20libs/lib.v2.{ending}#"
-    app = written(tmp_path / "model" / "app.owl", "http://example.org/app", relative)
+def importing(folder: Path, ending: str) -> Path:
+    """An ontology in a notation that imports a file of a folder beside its own."""
+    relative = CLIMBING.format(ending)
+    app = written(folder / "model" / "app.owl", "http://example.org/app", relative)
     if ending == "ttl":
         app = app.with_suffix(".ttl")
         app.write_text(
             "@prefix owl: <http://www.w3.org/2002/07/owl#> .\n"
             f"<http://example.org/app> a owl:Ontology ; owl:imports <{relative}> .\n"
         )
-    with pytest.raises(KnowledgeError, match=r"import \.\./my%20libs/lib\.v2\..*# does not"):
-        collect([app])
+    return app
+
+
+CLIMBING = "../my%20libs/lib.v2.{}#"
+"""A relative path out of the folder, with a space, dots, and a mark at its end."""
+
+
+@pytest.mark.parametrize("ending", ["owl", "ttl"])
+def test_a_relative_path_may_lead_out_of_the_folder(tmp_path, ending):
+    """A shared folder of ontologies beside that of the model."""
+    app = importing(tmp_path, ending)
     lib = written(tmp_path / "my libs" / "lib.v2.owl", LIB)
     if ending == "ttl":
         lib = lib.with_suffix(".ttl")
@@ -217,11 +238,29 @@ def test_relative_paths_may_climb_and_end_in_a_mark(tmp_path, ending):
     assert (supplied.resolve(), reason) == (lib, "by its path")
 
 
-@pytest.mark.parametrize("iri", ["a" * 400 + ".owl", "file:///" + "a" * 400, "file:gone/lib.owl"])
-def test_a_path_that_no_file_can_have_does_not_resolve(tmp_path, iri):
+@pytest.mark.parametrize(
+    "iri",
+    [
+        "http://example.org/wind.owl",
+        "sub/lib.owl",
+        "a" * 400 + ".owl",
+        "file:///" + "a" * 400,
+        "file:gone/lib.owl",
+    ],
+)
+def test_an_import_that_no_file_supplies_is_told_as_written_with_its_place(tmp_path, iri):
     app = written(tmp_path / "app.owl", "http://example.org/app", iri)
-    with pytest.raises(KnowledgeError, match=r"import .* does not resolve"):
+    with pytest.raises(KnowledgeError) as error:
         collect([app])
+    assert (error.value.file, error.value.place) == (str(app), "line 4")
+    assert error.value.problem.startswith(f"import {iri} does not resolve")
+
+
+@pytest.mark.parametrize("ending", ["owl", "ttl"])
+def test_a_path_that_leads_out_of_the_folder_to_no_file_is_told_as_written(tmp_path, ending):
+    with pytest.raises(KnowledgeError) as error:
+        collect([importing(tmp_path, ending)])
+    assert error.value.problem.startswith(f"import {CLIMBING.format(ending)} does not")
 
 
 def test_links_in_a_circle_beside_are_nobodys_input(tmp_path):
@@ -229,12 +268,6 @@ def test_links_in_a_circle_beside_are_nobodys_input(tmp_path):
     lib = written(tmp_path / "lib.owl", LIB)
     (tmp_path / "circle.owl").symlink_to("circle.owl")
     assert reasons(app)["app.owl", LIB][0] == lib
-
-
-def test_a_relative_path_that_leads_nowhere_is_told_as_written_with_its_line(tmp_path):
-    app = written(tmp_path / "app.owl", "http://example.org/app", "sub/lib.owl")
-    with pytest.raises(KnowledgeError, match=r"line 4: import sub/lib.owl does not resolve"):
-        collect([app])
 
 
 def test_file_urls_are_read(tmp_path):
@@ -250,7 +283,7 @@ CATALOG = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
 """
 
 
-def test_the_catalog_of_protege_wins_over_files_beside_and_shipped(tmp_path):
+def test_the_catalog_of_protege_wins_over_any_other_file(tmp_path):
     tomasys = "http://metacontrol.org/tomasys"
     app = written(tmp_path / "app.owl", "http://example.org/app", tomasys)
     mine = written(tmp_path / "sub" / "my%20own.owl", "http://example.org/mine")
@@ -284,13 +317,6 @@ def test_a_group_of_the_catalog_has_its_own_base(tmp_path):
     catalog = CATALOG.format(iri=LIB, uri="mine.owl").replace("<group ", '<group xml:base="sub/" ')
     (tmp_path / "catalog-v001.xml").write_text(catalog, encoding="utf-8")
     assert reasons(app)["app.owl", LIB] == (lib, "by catalog-v001.xml")
-
-
-def test_a_catalog_that_is_no_xml_is_named(tmp_path):
-    app = written(tmp_path / "app.owl", "http://example.org/app", LIB)
-    (tmp_path / "catalog-v001.xml").write_text("<catalog", encoding="utf-8")
-    with pytest.raises(KnowledgeError, match=r"catalog-v001.xml: not well-formed XML"):
-        collect([app])
 
 
 def test_damaged_files_beside_are_nobodys_input(tmp_path):
@@ -344,7 +370,9 @@ def test_rules_that_two_files_share_count_once(suave_copy, shipped, tmp_path, kb
 
 
 def test_kb_check_tells_which_file_supplies_an_import(tmp_path):
-    (note,) = [each for each in found(tmp_path) if each.message.startswith("imports: ")]
+    given = subject(tmp_path)
+    findings = static_findings(given, collect(given.ontologies))
+    (note,) = [each for each in findings if each.message.startswith("imports: ")]
     assert note.file == str(tmp_path / "suave.owl")
     assert note.message == (
         f"imports: {IMPORT} is shipped/ontology/tomasys.owl (shipped); "

@@ -3,7 +3,7 @@ not hold.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
 
@@ -13,7 +13,8 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import OWL, RDF, RDFS, SWRL, SWRLA
 from suave_des.knowledge.reasoner import Reasoner
-from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
+from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState
+from tests.helpers.checks import subject
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology, individual, rule
 
@@ -26,7 +27,7 @@ def with_files(*files: Path) -> Reasoner:
     return Reasoner(Ontology.load(files), "pellet")
 
 
-def test_all_rules_of_the_exemplar_are_there_and_enabled(kb):
+def test_the_enabled_rules_are_the_exemplars(kb):
     names = "QAWaterVisibility QAenergy QAsafety compErrFG compError compRecov mros_S4"
     numbered = "S1a S1b S1c S2 S3 S4 S5 S6a S6b S6c S9 S10 S11"
     assert {rule.name for rule in kb.rules if rule.enabled} == {*names.split(), *numbered.split()}
@@ -47,18 +48,29 @@ def test_visibility_below_what_the_design_expects_is_an_error(pellet, design, vi
     assert inference.objective_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
 
 
-def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet):
+def with_a_failed_thruster(reasoner: Reasoner) -> Inference:
     state = searching(
         "fd_spiral_low", 2.0, motion="fd_all_thrusters", components={"c_thruster_3": "FALSE"}
     )
-    assert inferred(pellet, state) == {
+    return reasoner.analyze(state)
+
+
+def test_what_follows_from_a_failed_thruster(pellet):
+    assert set(map(str, with_a_failed_thruster(pellet).facts)) == {
         "fd_realisability(fd_all_thrusters, false)",
         "fg_status(fg_all_thrusters, IN_ERROR_COMPONENT)",
         "o_status(o_maintain_motion, IN_ERROR_COMPONENT)",
     }
-    inference = pellet.analyze(state)
-    assert inference.values("fd_all_thrusters", "fd_realisability") == (False,)
-    assert False not in inference.values("fd_recover_thrusters", "fd_realisability")
+
+
+@pytest.mark.parametrize(
+    ("design", "is_realisable"), [("fd_all_thrusters", False), ("fd_recover_thrusters", True)]
+)
+def test_a_failed_thruster_makes_the_design_unrealisable_that_requires_it(
+    pellet, design, is_realisable
+):
+    found = with_a_failed_thruster(pellet).values(design, "fd_realisability")
+    assert found == (() if is_realisable else (False,))
 
 
 def test_the_recovering_design_is_not_in_error_by_a_failed_thruster(pellet):
@@ -81,27 +93,45 @@ def test_a_recovered_component_makes_every_objective_updatable(pellet):
     }
 
 
-@pytest.mark.parametrize("attribute", ["energy", "safety"])
-@pytest.mark.parametrize(("measured", "in_error"), [(0.6, True), (0.5, False), (0.4, False)])
-def test_more_than_the_objective_requires_is_an_error_and_logged(
-    suave_copy, attribute, measured, in_error
-):
-    path = suave_copy(
+@pytest.fixture(scope="module", params=["energy", "safety"])
+def limited(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[float], Inference]:
+    """Infers from a measured value of which the search's objective requires at most 0.5."""
+    attribute = request.param
+    extra = (
         individual("nfr", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.5"))
         + individual("qa_low", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.9"))
         + individual("fd_spiral_low", "FunctionDesign", ("hasQAestimation", ":qa_low"))
         + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
     )
-    state = KnowledgeState.of(
-        [ObjectiveState(SEARCH)],
-        groundings={SEARCH: "fd_spiral_low"},
-        measurements={attribute: measured},
-    )
-    inference = with_files(path).analyze(state)
-    assert inference.objective_status(SEARCH) == ("IN_ERROR_FR" if in_error else None)
-    assert inference.values("fd_spiral_low", "fd_error_log") == (
-        ("o_generate_search_path",) if in_error else ()
-    )
+    reasoner = with_files(*subject(tmp_path_factory.mktemp(attribute), extra=extra).ontologies)
+
+    def infer(measured: float) -> Inference:
+        state = KnowledgeState.of(
+            [ObjectiveState(SEARCH)],
+            groundings={SEARCH: "fd_spiral_low"},
+            measurements={attribute: measured},
+        )
+        return reasoner.analyze(state)
+
+    return infer
+
+
+AROUND_THE_LIMIT = pytest.mark.parametrize(
+    ("measured", "in_error"), [(0.6, True), (0.5, False), (0.4, False)]
+)
+
+
+@AROUND_THE_LIMIT
+def test_more_than_the_objective_requires_is_an_error(limited, measured, in_error):
+    assert limited(measured).objective_status(SEARCH) == ("IN_ERROR_FR" if in_error else None)
+
+
+@AROUND_THE_LIMIT
+def test_more_than_the_objective_requires_is_in_the_designs_error_log(limited, measured, in_error):
+    logged = limited(measured).values("fd_spiral_low", "fd_error_log")
+    assert logged == (("o_generate_search_path",) if in_error else ())
 
 
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
@@ -147,7 +177,7 @@ def bound_thruster(status: str) -> str:
     )
 
 
-def test_the_boolean_status_of_older_models_puts_binding_and_grounding_in_error(suave_copy):
+def test_what_follows_from_the_boolean_status_of_older_models(suave_copy):
     reasoner = with_files(suave_copy(bound_thruster("false")))
     assert inferred(reasoner, searching("fd_spiral_low")) == {
         "b_status(b_camera, false)",  # S2
@@ -204,12 +234,16 @@ def _clash(suave_copy: MakeOntology) -> Path:
     )
 
 
-@pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy, name):
-    reasoner = Reasoner(Ontology.load([_clash(suave_copy)]), name)
+def clash(reasoner: Reasoner) -> str:
+    """What is told of a state in which two rules contradict each other."""
     with pytest.raises(KnowledgeError) as error:
         reasoner.analyze(searching("fd_spiral_high", 3.0))
-    message = str(error.value)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("name", ["pellet", "owlready2"])
+def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy, name):
+    message = clash(Reasoner(Ontology.load([_clash(suave_copy)]), name))
     for part in (
         "fg_spiral_high",
         "fg_status",
@@ -219,11 +253,13 @@ def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy, name):
     ):
         assert part in message
     assert "\n" not in message
-    if name == "pellet":  # and the next state is reasoned on as if nothing had happened
-        assert (
-            reasoner.analyze(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH)
-            == "IN_ERROR_FR"
-        )
+
+
+def test_a_contradiction_leaves_no_trace_in_the_next_state(suave_copy):
+    reasoner = with_files(_clash(suave_copy))
+    clash(reasoner)
+    later = reasoner.analyze(searching("fd_spiral_high", 4.0))
+    assert later.grounding_status(SEARCH) == "IN_ERROR_FR"
 
 
 def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy):

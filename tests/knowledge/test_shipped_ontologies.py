@@ -9,6 +9,9 @@ from xml.etree import ElementTree
 import pytest
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
+from rdflib.term import Node
+
+from suave_des.resources import shipped_folder
 
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
@@ -75,26 +78,40 @@ def test_the_terms_for_robots_are_in_a_file_of_their_own(tomasys, mros):
     assert not [term for term in tomasys.all_nodes() if str(term).startswith(MROS)]
 
 
-def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped):
-    for path in shipped.glob("*.owl"):
-        graph = Graph().parse(path, format="xml")
-        kinds = [
-            OWL.Class,
-            OWL.ObjectProperty,
-            OWL.DatatypeProperty,
-            OWL.NamedIndividual,
-            URIRef(SWRL + "Imp"),
-        ]
-        terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
-        assert terms
-        for term in terms:
-            assert graph.value(term, RDFS.label), term
-            assert graph.value(term, RDFS.comment), term
+@pytest.fixture(
+    scope="module",
+    params=sorted(shipped_folder("ontology").glob("*.owl")),
+    ids=lambda path: path.stem,
+)
+def terms(request: pytest.FixtureRequest) -> tuple[Graph, set[Node]]:
+    """An ontology, with its terms and rules."""
+    graph = Graph().parse(request.param, format="xml")
+    kinds = [
+        OWL.Class,
+        OWL.ObjectProperty,
+        OWL.DatatypeProperty,
+        OWL.NamedIndividual,
+        URIRef(SWRL + "Imp"),
+    ]
+    return graph, {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
 
 
-def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
+@pytest.mark.parametrize("annotation", [RDFS.label, RDFS.comment], ids=["label", "comment"])
+def test_every_term_or_rule_is_annotated(terms, annotation):
+    graph, annotated = terms
+    assert annotated
+    assert [term for term in annotated if not graph.value(term, annotation)] == []
+
+
+def test_the_functions_have_the_exemplars_names(kb):
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
+
+
+def test_the_components_have_the_exemplars_names(kb):
     assert tuple(kb.model.components) == tuple(f"c_thruster_{n}" for n in range(1, 7))
+
+
+def test_the_quality_attributes_have_the_exemplars_names(kb):
     assert set(kb.model.attributes) == {
         "water_visibility",
         "battery_level",
@@ -102,6 +119,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "energy",
         "safety",
     }
+
+
+def test_the_expected_visibilities_are_the_deployed_ones(kb):
     visibility = {
         d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")
     }
@@ -110,6 +130,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "fd_spiral_low": Decimal("1.25"),
         "fd_spiral_medium": Decimal("2.25"),
     }
+
+
+def test_the_expected_performances_are_the_deployed_ones(kb):
     performance = {d: kb.expected(d)["performance"] for f in kb.functions for d in kb.designs(f)}
     assert performance == {
         "fd_all_thrusters": Decimal(1),
@@ -119,6 +142,9 @@ def test_the_model_has_the_exemplars_names_and_deployed_values(kb):
         "fd_spiral_high": Decimal(1),
         "fd_follow_pipeline": Decimal(1),
     }
+
+
+def test_the_model_has_all_that_missions_need(kb):
     kb.check(kb.functions)
 
 

@@ -73,16 +73,29 @@ def test_the_next_work_waits_for_what_was_given_up():
     assert limit.run(lambda: 8, "reasoning") == 8
 
 
-def test_what_still_goes_on_then_is_stuck_and_all_else_refused_at_once(released):
+@pytest.fixture
+def stuck(released) -> TimeLimit:
+    """A limit whose reasoner still works on what was given up, and on what was asked next."""
     limit = TimeLimit(LIMIT_S)
     give_up(limit, released)
-    refused = pytest.raises(ReasonerTimeoutError, match="the reasoner is still waiting")
-    with refused:
+    refuse(limit)
+    return limit
+
+
+def refuse(limit: TimeLimit) -> None:
+    """Have work refused."""
+    with pytest.raises(ReasonerTimeoutError, match="the reasoner is still waiting"):
         limit.run(lambda: 7, "reasoning")
+
+
+@pytest.mark.usefixtures("stuck")
+def test_what_still_goes_on_when_the_next_work_is_given_up_is_stuck():
     assert is_stuck()
+
+
+def test_a_reasoner_that_is_stuck_refuses_all_work_at_once(stuck):
     began_s = time.process_time()
-    with refused:
-        limit.run(lambda: 7, "reasoning")
+    refuse(stuck)
     assert time.process_time() - began_s < LIMIT_S
 
 

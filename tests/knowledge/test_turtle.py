@@ -59,7 +59,7 @@ def test_the_shipped_ontology_says_the_same_in_another_notation(converted):
     assert before == after and before
 
 
-def test_it_imports_and_is_imported_by_name(tmp_path, converted):
+def test_an_ontology_in_it_imports_another_by_name(tmp_path, converted):
     mine = tmp_path / "mine.ttl"
     mine.write_text(MINE.replace("suave:salinity", "suave:water_visibility"))
     ontology = Ontology.load([mine])

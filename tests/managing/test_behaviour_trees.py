@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from suave_des.errors import InputError
-from suave_des.managing.bt import ExtendedBehaviourTree, least_that_reaches
-from suave_des.resources import find
-from suave_des.scenario.loader import load_scenario
+from suave_des.managing.bt import least_that_reaches
 from tests.helpers.managers_at_work import FOLLOW, MOTION, SEARCH, AtWork
 
 RECHARGE = "generate_recharge_path"
@@ -127,12 +124,21 @@ def test_recharging_still_recovers_thrusters():
     assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
 
 
-def test_recharged_it_goes_on_and_ends_the_way_to_the_station():
+@pytest.fixture
+def recharged() -> dict[str, str]:
+    """What is asked for once a battery that was low is full again."""
     at_work = with_battery(0.2)
     at_work.adapt()
     at_work.measured("battery_level", 1.0)
-    asked = dict(at_work.adapt())
-    assert asked[SEARCH] == "fd_spiral_high" and asked[RECHARGE] == "inactive"
+    return dict(at_work.adapt())
+
+
+def test_recharged_it_goes_on(recharged):
+    assert recharged[SEARCH] == "fd_spiral_high"
+
+
+def test_recharged_it_ends_the_way_to_the_station(recharged):
+    assert recharged[RECHARGE] == "inactive"
 
 
 @pytest.mark.parametrize(
@@ -142,16 +148,6 @@ def test_recharged_it_goes_on_and_ends_the_way_to_the_station():
 def test_it_compares_the_battery_s_level_in_single_precision(level, recharges):
     """As std::stof reads it: the number between is halfway to the next lower one, 0.24999999."""
     assert (RECHARGE in dict(with_battery(level).adapt())) == recharges
-
-
-def test_a_mode_that_it_needs_at_the_station_is_missed_before_the_mission(tmp_path):
-    modes = find("suave_extended_modes.yaml", "scenarios").read_text()
-    lacking = modes.replace("      inactive:\n        generate_recharge_path_node: inactive\n", "")
-    assert lacking != modes
-    (tmp_path / "modes.yaml").write_text(lacking)
-    (tmp_path / "own.yaml").write_text("base: extended\nmodes_file: modes.yaml\n")
-    with pytest.raises(InputError, match="has no mode 'inactive', which it requests"):
-        ExtendedBehaviourTree.check(load_scenario(tmp_path / "own.yaml"))
 
 
 @pytest.mark.parametrize("threshold", [0.25, 0.1, 0.3, 3.25, -0.25, 1e-3])

@@ -85,17 +85,26 @@ def test_the_search_is_as_high_as_the_measured_visibility_allows(name, value, de
         assert "no function design is left" in told(found, "no_design_left")[0]
 
 
-@BOTH
-def test_a_lost_thruster_is_recovered_and_all_thrusters_are_used_again(name):
-    found = mission({**visibility(1.5), **REASONED_AT_ONCE}, name=name)
-    (_, first), (recover_s, recover), (back_s, back) = modes(found, MOTION)[:3]
-    assert (first, recover, back) == (
-        "fd_all_thrusters",
-        "fd_recover_thrusters",
-        "fd_all_thrusters",
-    )
-    period_s = {"seams2023": 2.0, "release15": 1.5}[name]
+@pytest.fixture(scope="module", params=["seams2023", "release15"])
+def recovery(request: pytest.FixtureRequest) -> tuple[float, list[tuple[float, str]]]:
+    """Period of the cycles, and the modes asked for around a failure at 35 s."""
+    found = mission({**visibility(1.5), **REASONED_AT_ONCE}, name=request.param)
+    return {"seams2023": 2.0, "release15": 1.5}[request.param], modes(found, MOTION)[:3]
+
+
+def test_all_thrusters_are_used_again_after_a_recovery(recovery):
+    _, asked = recovery
+    used = ["fd_all_thrusters", "fd_recover_thrusters", "fd_all_thrusters"]
+    assert [mode for _, mode in asked] == used
+
+
+def test_a_lost_thruster_is_recovered_by_the_next_cycle(recovery):
+    period_s, (_, (recover_s, _), _) = recovery
     assert 35.0 <= recover_s <= 36.0 + period_s
+
+
+def test_a_recovery_ends_within_a_cycle_of_its_time(recovery):
+    period_s, (_, (recover_s, _), (back_s, _)) = recovery
     assert recover_s + 10.0 <= back_s <= recover_s + 11.5 + period_s
 
 
@@ -186,26 +195,50 @@ def test_revision_15_waits_for_the_first_measurement():
     assert modes(mission(late), SEARCH)[0] == (pytest.approx(1.5, abs=1.5), "fd_spiral_high")
 
 
-def found_pipeline(name: str) -> MissionResult:
-    found = (mission({}, name=name, limit_s=300.0, run=run) for run in range(1, 9))
-    return next(each for each in found if each.metrics.pipeline_found)
-
-
-def test_in_2023_the_search_ends_at_a_tick_of_the_bridge_and_following_waits_for_a_cycle():
-    found = found_pipeline("seams2023")
+def found_pipeline(name: str) -> tuple[MissionResult, float]:
+    """A mission in which the pipeline is found, and when its inspection is requested."""
+    missions = (mission({}, name=name, limit_s=300.0, run=run) for run in range(1, 9))
+    found = next(each for each in missions if each.metrics.pipeline_found)
     requested_s = next(event.t_s for event in found.events if event.detail == "inspect_pipeline")
+    return found, requested_s
+
+
+@pytest.fixture(scope="module")
+def found_in_2023() -> tuple[MissionResult, float, float]:
+    """Also with the time at which the search ends."""
+    found, requested_s = found_pipeline("seams2023")
     ended_s = next(t_s for t_s, mode in modes(found, SEARCH) if mode == "fd_unground")
-    followed_s = modes(found, FOLLOW)[0][0]
+    return found, requested_s, ended_s
+
+
+def test_in_2023_the_search_ends_at_a_tick_of_the_bridge(found_in_2023):
+    _, requested_s, ended_s = found_in_2023
     assert requested_s < ended_s <= requested_s + 2.0
-    assert ended_s + 1.0 <= followed_s <= ended_s + 3.0
+
+
+def test_in_2023_following_waits_for_a_cycle(found_in_2023):
+    found, _, ended_s = found_in_2023
+    assert ended_s + 1.0 <= modes(found, FOLLOW)[0][0] <= ended_s + 3.0
+
+
+def test_in_2023_maintain_motion_goes_on_between_the_tasks(found_in_2023):
+    found, _, _ = found_in_2023
     assert "fd_unground" not in [mode for _, mode in modes(found, MOTION)]
 
 
-def test_in_15_the_tasks_end_and_begin_at_once_and_maintain_motion_with_them():
-    found = found_pipeline("release15")
-    requested_s = next(event.t_s for event in found.events if event.detail == "inspect_pipeline")
-    assert (requested_s, "fd_unground") in modes(found, SEARCH)
-    assert (requested_s, "fd_unground") in modes(found, MOTION)
+@pytest.fixture(scope="module")
+def found_in_15() -> tuple[MissionResult, float]:
+    return found_pipeline("release15")
+
+
+@pytest.mark.parametrize("function", [SEARCH, MOTION])
+def test_in_15_a_task_ends_at_once_with_all_its_functions(found_in_15, function):
+    found, requested_s = found_in_15
+    assert (requested_s, "fd_unground") in modes(found, function)
+
+
+def test_in_15_the_next_task_is_reasoned_about_at_once(found_in_15):
+    found, requested_s = found_in_15
     assert 1.0 <= modes(found, FOLLOW)[0][0] - requested_s <= 2.5
 
 
@@ -260,18 +293,26 @@ def test_a_design_without_a_mode_is_bad_input(suave_copy):
         mission({}, ontologies=[suave_copy(NEW_DESIGN)])
 
 
-def test_a_rule_that_contradicts_another_ends_the_mission_with_both_named(tmp_path):
-    """They clash in the cycle that finds the water too murky for the present design, not before."""
-    rules = tmp_path / "clash.swrl"
+@pytest.fixture(scope="module")
+def contradiction(tmp_path_factory: pytest.TempPathFactory) -> MissionError:
+    """Rules clash in the cycle that finds the water too murky for the present design, not before."""
+    rules = tmp_path_factory.mktemp("rules") / "clash.swrl"
     rules.write_text(
         'everything_is_in_error: FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_FR")\n'
     )
     with pytest.raises(MissionError) as raised:
         mission({**steps(3.5, 1.5, 21.0), **FIRST_CYCLE_S}, rules=[rules])
-    assert raised.value.manager == "metacontrol" and raised.value.time_s == pytest.approx(21.5)
-    assert "everything_is_in_error" in str(raised.value) and "QAWaterVisibility" in str(
-        raised.value
-    )
+    return raised.value
+
+
+def test_rules_that_contradict_one_another_end_the_mission_where_they_do(contradiction):
+    assert contradiction.manager == "metacontrol"
+    assert contradiction.time_s == pytest.approx(21.5)
+
+
+@pytest.mark.parametrize("rule", ["everything_is_in_error", "QAWaterVisibility"])
+def test_each_rule_that_contradicts_another_is_named(contradiction, rule):
+    assert rule in contradiction.cause
 
 
 @pytest.mark.parametrize("oldest", [False, True])

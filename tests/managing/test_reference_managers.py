@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
-from suave_des import InputError, run_campaign, run_mission
-from suave_des.registry import is_built_in, manager_class
+from suave_des import run_mission
+from suave_des.registry import is_built_in
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import support
 from suave_des.simulation.simulator import Simulator
@@ -123,22 +123,18 @@ def requests(manager: str, scenario: str = "seams2023", run: int = 1) -> list[tu
     return [(each.t_s, each.detail) for each in events if each.event == "mode_requested"]
 
 
-def test_fixed_sets_its_mode_and_never_adapts():
-    found = requests("fixed:fd_spiral_medium")
-    assert found[0] == (0.0, "f_generate_search_path -> fd_spiral_medium")
-    assert [detail for _, detail in found if "unground" not in detail][1:] == [
-        "f_follow_pipeline -> fd_follow_pipeline"
-    ]
+@pytest.fixture(scope="module")
+def with_a_fixed_mode() -> list[tuple[float, str]]:
+    return requests("fixed:fd_spiral_medium")
 
 
-def test_a_mode_that_no_function_has_is_refused_before_any_mission():
-    with pytest.raises(InputError, match="did you mean 'fd_spiral_high'"):
-        run_campaign("seams2023", ["fixed:fd_spiral_hihg"], runs=1)
+def test_fixed_sets_its_mode_at_the_start(with_a_fixed_mode):
+    assert with_a_fixed_mode[0] == (0.0, "f_generate_search_path -> fd_spiral_medium")
 
 
-def test_fixed_without_a_mode_is_refused():
-    with pytest.raises(InputError, match="write fixed:MODE"):
-        manager_class("fixed:")
+def test_fixed_never_adapts(with_a_fixed_mode):
+    later = [detail for _, detail in with_a_fixed_mode if "unground" not in detail][1:]
+    assert later == ["f_follow_pipeline -> fd_follow_pipeline"]
 
 
 def test_they_need_no_trust_as_they_are_the_projects_own():

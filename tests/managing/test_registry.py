@@ -21,22 +21,6 @@ def test_module_is_found_in_the_current_folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("no.such.module:Mine", "no module named 'no'"),
-        ("suave_des.managing.simple:Nobody", "no subclass of ManagingSubsystem named 'Nobody'"),
-        ("suave_des.managing.simple:Task", "no subclass of ManagingSubsystem"),
-        ("suave_des.managing.simple:", "no subclass of ManagingSubsystem"),
-        (":Mine", "empty module name"),
-        ("zebra", "no manager 'zebra'"),
-    ],
-)
-def test_a_name_that_leads_to_no_manager_is_bad_input(name, words):
-    with pytest.raises(InputError, match=f"(?i){words}"):
-        manager_class(name)
-
-
-@pytest.mark.parametrize(
     ("source", "problem", "place"),
     [
         ("import sys\nsys.exit(0)\n", "SystemExit", "line 2"),

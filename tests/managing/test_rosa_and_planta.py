@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import pytest
 
 from suave_des.api import run_mission
-from suave_des.errors import InputError
 from suave_des.kb.decision_table import find_table
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.scenario.loader import load_scenario
@@ -156,9 +155,3 @@ def test_planta_alone_leaves_recovered_thrusters_in_recovery(manager, mode):
     assert f"{MOTION} -> {RECOVER}" in details
     in_use = [each for each in details if MOTION in each and not each.endswith("fd_unground")]
     assert in_use[-1] == f"{MOTION} -> {mode}"
-
-
-@pytest.mark.parametrize("manager", ["rosa", "planta"])
-def test_what_its_model_says_nothing_of_is_refused(manager):
-    with pytest.raises(InputError, match="no row decides generate_recharge_path"):
-        run_mission("extended", manager, 1, 1)

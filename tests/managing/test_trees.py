@@ -104,23 +104,41 @@ def test_the_command_draws_the_tree_of_a_manager(manager, scenario):
     assert ("battery is below 0.25" in shown) is (manager == "bt_extended")
 
 
-def test_a_manager_without_tree_is_refused():
-    assert "has no tree" in str(CliRunner().invoke(app, ["tree", "metacontrol"]).exception)
+@pytest.fixture(scope="module")
+def ours() -> MissionResult:
+    """A mission with the tree bt."""
+    return flown("bt")
 
 
-def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing():
-    plain, noted = flown("bt"), flown("bt", managers__bt__records_ticks=True)
+@pytest.fixture(scope="module")
+def noted() -> MissionResult:
+    """The same one, with its ticks in the timeline."""
+    return flown("bt", managers__bt__records_ticks=True)
+
+
+def test_ticks_in_the_timeline_change_nothing_else_of_it(ours, noted):
+    assert [event for event in noted.events if event.event != "tick"] == list(ours.events)
+
+
+def test_a_tick_in_the_timeline_has_the_mode_with_its_conditions(noted):
+    first = next(event for event in noted.events if event.event == "tick")
+    conditions = "is needed, visibility is at least 3.25 m"
+    assert f"f_generate_search_path = fd_spiral_high ({conditions}" in first.detail
+
+
+def test_of_ticks_with_the_same_outcome_the_first_is_in_the_timeline(noted):
     ticks = [event for event in noted.events if event.event == "tick"]
-    assert [event for event in noted.events if event.event != "tick"] == list(plain.events)
-    assert (
-        "f_generate_search_path = fd_spiral_high (is needed, visibility is at least 3.25 m"
-        in ticks[0].detail
-    )
+    assert len(ticks) > 1
     assert all(earlier.detail != later.detail for earlier, later in pairwise(ticks))
 
 
-def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours():
-    mine, ours = flown(f"{__name__}:Mine"), flown("bt")
+@pytest.fixture(scope="module")
+def mine() -> MissionResult:
+    """A mission with the tree that is made of py_trees."""
+    return flown(f"{__name__}:Mine")
+
+
+def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours(mine, ours):
     modes = [
         [
             event.detail
@@ -130,6 +148,9 @@ def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours():
         for result in (mine, ours)
     ]
     assert modes[0] == modes[1]
+
+
+def test_ticks_of_a_tree_of_py_trees_are_in_the_timeline(mine):
     assert any(
         event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events
     )
