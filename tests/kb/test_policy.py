@@ -16,7 +16,9 @@ from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, _spans, function_table
 from suave_des.kb.scale import Scale
 from suave_des.kb.situations import Situation
-from suave_des.kb.space import PolicySpace, States, component_reports, kind_of
+from suave_des.kb.deciding import kind_of
+from suave_des.kb.reports import component_reports
+from suave_des.kb.space import PolicySpace, States
 from suave_des.kb.states import ManagingSettings
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS, individual
@@ -382,7 +384,7 @@ def test_what_has_an_effect_in_either_knowledge_base_is_told_apart():
     both = PolicySpace(
         ("a", "b"), (Decimal(1), Decimal(2)), (("c",), ("d",)), ("FALSE", "HOT"), ("f", "g")
     )
-    assert one.common(other) == both
+    assert one.union(other) == both
 
 
 @pytest.mark.parametrize(("kinds", "said"), [(5, []), (6, ["  and 1 more kinds: see --csv"])])
