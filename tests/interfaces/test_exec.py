@@ -217,7 +217,7 @@ def assert_all_ended() -> None:
 
 
 @pytest.mark.usefixtures("quick_workers")
-def test_programs_and_their_children_end_with_the_campaign():
+def test_all_processes_of_programs_end_with_the_campaign():
     run_campaign("seams2023", [program(WITH_A_CHILD + EVERY_PERIOD)], runs=2, workers=2)
     assert_all_ended()
 
@@ -236,7 +236,7 @@ def test_the_children_of_a_program_that_fails_end_with_its_mission():
         pytest.param(1, signal.SIGKILL, marks=pytest.mark.slow),
     ],
 )
-def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers, number):
+def test_all_processes_of_programs_end_when_the_campaign_is_stopped(workers, number):
     manager = program(WITH_A_CHILD + "time.sleep(600)\n")
     options = (
         "--manager-option",
