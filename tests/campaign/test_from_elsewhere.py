@@ -3,6 +3,7 @@ manifest says.
 """
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,13 @@ runs: 2
 
 
 @pytest.fixture
-def experiment(tmp_path: Path) -> Path:
-    """A folder with a campaign file, and a manager's module with one that it imports."""
+def experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a campaign file, and a manager's module with one that it imports, which are not
+    loaded yet, nor told of.
+    """
+    monkeypatch.setattr("suave_des.user_code._told", set())
+    for name in ("high", "height"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     folder = tmp_path / "experiment"
     folder.mkdir()
     (folder / "campaign.yaml").write_text(CAMPAIGN)

@@ -142,6 +142,12 @@ CAMPAIGN = "campaign: 1\nscenario: seams2023\nruns: 1\nmanagers: ['mine:Mine', '
 SCENARIO = "base: seams2023\nfunctions: {f_generate_search_path: {node: 'mine:Node'}}\n"
 
 
+@pytest.fixture
+def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.user_code._told", set())
+
+
+@pytest.mark.usefixtures("told_nothing_yet")
 @pytest.mark.parametrize(
     ("text", "command", "told"),
     [
