@@ -402,7 +402,3 @@ class TestBadInput:
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(InputError, match=r"\(pip install 'suave-des\[dask\]'\)"):
             run_campaign("seams2023", ["none"], 1, 1, scheduler="tcp://127.0.0.1:8786")
-
-    def test_workers_besides_a_scheduler(self):
-        with pytest.raises(InputError, match=r"workers: 2 cannot be used with a scheduler"):
-            run_campaign("seams2023", ["none"], 1, 1, 2, scheduler="tcp://127.0.0.1:8786")
