@@ -205,7 +205,7 @@ def written(path: Path, runs: pandas.DataFrame) -> Path:
     return path
 
 
-def test_shuffled_runs_are_scored_by_their_starts_and_failure_times(study, tmp_path):
+def test_shuffled_runs_have_the_same_score(study, tmp_path):
     runs = pandas.read_csv(PUBLISHED).drop(columns=["condition", "nominal_y_m"])
     file = written(tmp_path / "runs.csv", runs.sample(frac=1.0, random_state=1))
     module = study("predict")
@@ -282,16 +282,26 @@ def test_runs_whose_order_does_not_tell_their_conditions_are_refused(study, tmp_
         module.scored("exp1", [file])
 
 
-@pytest.mark.parametrize(
+each_study = pytest.mark.parametrize(
     "name, script", [*((name, name) for name in CASES), ("predictions", "predict")]
 )
-def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, name, script):
-    module, rows = study(script), committed(name)
-    assert (FOLDER / name / "conclusion.md").read_text(encoding="utf-8").strip() == module.conclude(
-        rows
-    ).strip()
+
+
+@each_study
+def test_the_committed_conclusion_follows_from_the_committed_table(study, name, script):
+    conclusion = (FOLDER / name / "conclusion.md").read_text(encoding="utf-8").strip()
+    assert conclusion == study(script).conclude(committed(name)).strip()
+
+
+@pytest.mark.parametrize("name", [*CASES, "predictions"])
+def test_the_committed_figure_is_small(name):
     assert (FOLDER / name / f"{name}.png").stat().st_size < 500_000
-    assert module.studies.figure_of(module.draw, rows, height=3.0).axes
+
+
+@each_study
+def test_the_committed_table_can_be_drawn(study, name, script):
+    module = study(script)
+    assert module.studies.figure_of(module.draw, committed(name), height=3.0).axes
 
 
 def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(study):
@@ -307,8 +317,9 @@ def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(st
     assert found.median_difference_s == pytest.approx(before["median_difference_s"], abs=1e-3)
 
 
-def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chance(study):
-    module = study("predict")
+@pytest.fixture
+def predicted(study):
+    """Predictions of three members, of which each has two runs: in all conditions, by manager."""
     values = {1: [10.0, 12.0], 2: [20.0, 22.0], 3: [30.0, 32.0]}
     rows = [
         {
@@ -325,19 +336,27 @@ def test_predictions_count_what_members_share_as_parameters_and_the_rest_as_chan
     missions = pandas.DataFrame(rows).assign(
         distance_inspected_m=float("nan"), mean_reaction_time_s=float("nan")
     )
-    found = {row["manager"]: row for row in module.predict(missions) if row["condition"] == "all"}
+    found = study("predict").predict(missions)
+    return {row["manager"]: row for row in found if row["condition"] == "all"}
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "chance"), [("a", 21.0, 2.0), ("b", 42.0, 8.0), ("a - b", -21.0, 10.0)]
+)
+def test_what_runs_of_a_member_differ_in_counts_as_chance(predicted, name, mean, chance):
+    row = predicted[name]
+    assert (row["mean"], row["std"]) == pytest.approx((mean, chance**0.5))
+
+
+@pytest.mark.parametrize(
+    ("name", "between", "chance"), [("a", 100.0, 2.0), ("b", 400.0, 8.0), ("a - b", 100.0, 10.0)]
+)
+def test_what_runs_of_a_member_share_counts_as_its_parameters(predicted, name, between, chance):
     quantile = 2.919986  # of Student's t, 90%, 2 degrees of freedom
-    for name, mean, between, chance in (
-        ("a", 21.0, 100.0, 2.0),
-        ("b", 42.0, 400.0, 8.0),
-        ("a - b", -21.0, 100.0, 10.0),
-    ):
-        assert (found[name]["mean"], found[name]["std"]) == pytest.approx((mean, chance**0.5))
-        # means of two simulated runs, and of five real ones
-        variance = between - chance / 2.0 + chance / 5.0
-        assert (found[name]["high90"] - mean) ** 2 == pytest.approx(
-            quantile**2 * variance, rel=1e-5
-        )
+    # means of two simulated runs, and of five real ones
+    variance = between - chance / 2.0 + chance / 5.0
+    half = predicted[name]["high90"] - predicted[name]["mean"]
+    assert half**2 == pytest.approx(quantile**2 * variance, rel=1e-5)
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)

@@ -62,15 +62,28 @@ def test_the_yaw_rate_for_an_error_is_that_of_the_square_root_controller(turning
     assert demanded(math.radians(20.0)) == pytest.approx(math.radians(math.sqrt(4400.0)))
 
 
-def test_values_are_chosen_among_the_shipped_ones_and_points_within_the_bounds(turning):
-    shipped, *others = turning.sets_of_values(turning.VARIANTS["(c), (d) target waits"])
-    assert shipped == {}
-    assert len(others) == turning.SETS
-    for values in others:
-        assert turning.JERK not in values
-        for path, value in values.items():
-            lower, upper = turning.BOUNDS[path]
-            assert lower <= value <= upper
+@pytest.fixture
+def tried(turning) -> list[dict[str, float]]:
+    """Sets of values that are tried for a variant."""
+    return turning.sets_of_values(turning.VARIANTS["(c), (d) target waits"])
+
+
+def test_the_shipped_values_are_tried_first(tried):
+    assert tried[0] == {}
+
+
+def test_so_many_other_sets_of_values_are_tried(turning, tried):
+    assert len(tried[1:]) == turning.SETS
+
+
+def test_values_that_are_tried_are_within_their_bounds(turning, tried):
+    for path, value in [item for values in tried[1:] for item in values.items()]:
+        lower, upper = turning.BOUNDS[path]
+        assert lower <= value <= upper
+
+
+def test_the_jerk_that_a_variant_fixes_is_not_tried(turning, tried):
+    assert not [values for values in tried[1:] if turning.JERK in values]
 
 
 def test_values_of_ardusub_are_held_while_others_are_chosen(turning):

@@ -16,7 +16,7 @@ OF_PYTHON_ITSELF = ("in _get_module_details", "Could not import runpy module")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path, number):
+def test_a_campaign_that_is_stopped_many_times_has_the_same_bytes(tmp_path, number):
     (tmp_path / "short.yaml").write_text(chaos.SHORT)
     arguments = ["short.yaml", "--managers", ",".join(chaos.MANAGERS), "--runs", "400"]
     whole = chaos.start([*arguments, "--out", "whole"], tmp_path)

@@ -3,6 +3,7 @@ while it runs.
 """
 
 import errno
+import functools
 import io
 import json
 import math
@@ -21,6 +22,7 @@ from suave_des.campaign import workers
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.missions import GIVEN_UP, WorkerError
 from suave_des.campaign.progress import Progress
+from suave_des.campaign.results import CampaignResult
 from suave_des.campaign.workers import LocalWorkers
 from suave_des.draws import Streams
 from suave_des.errors import InputError
@@ -58,36 +60,61 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers, tmp_path):
     assert manifest["missions"]["failed"] == len(failed)
 
 
-def test_a_manager_that_calls_exit_is_one_that_raises_and_when_all_missions_fail_there_are_no_rows(
-    tmp_path,
-):
-    result = run_campaign("seams2023", [f"{AWKWARD}:Quits"], 1, 1, out=tmp_path / "out")
+@pytest.fixture(scope="module")
+def all_failed(tmp_path_factory: pytest.TempPathFactory) -> tuple[CampaignResult, Path]:
+    """A campaign whose manager calls sys.exit in its only mission, and its folder."""
+    out = tmp_path_factory.mktemp("quits") / "out"
+    return run_campaign("seams2023", [f"{AWKWARD}:Quits"], 1, 1, out=out), out
+
+
+def test_a_manager_that_calls_exit_is_one_that_raises(all_failed):
+    result, _ = all_failed
     assert [failure.cause for failure in result.failures] == [
         "SystemExit: no more (awkward_managers.py, line 41)"
     ]
-    assert rows_of(tmp_path / "out") == []
-    assert (
-        (tmp_path / "out" / "summary.csv")
-        .read_text()
-        .splitlines()[1]
-        .startswith(f"{AWKWARD}:Quits,0,")
-    )
 
 
-def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path):
-    manager = f"{AWKWARD}:DiesInSome"
-    result = run_campaign("seams2023", ["none", manager], 12, 1, 2, tmp_path / "out")
+def test_when_all_missions_fail_there_are_no_rows(all_failed):
+    _, out = all_failed
+    assert rows_of(out) == []
+
+
+def test_when_all_missions_fail_the_summary_says_so(all_failed):
+    _, out = all_failed
+    (row,) = rows_of(out / "summary.csv")
+    assert (row["manager"], row["n"]) == (f"{AWKWARD}:Quits", "0")
+
+
+@functools.cache
+def with_deaths(folder: Path) -> tuple[CampaignResult, Path]:
+    """Fly a campaign of which some missions kill their worker; return its folder, too."""
+    out = folder / "deaths"
+    return run_campaign("seams2023", ["none", DIES], 12, 1, 2, out), out
+
+
+DIES = f"{AWKWARD}:DiesInSome"
+
+
+def test_a_mission_that_kills_three_workers_has_failed(tmp_path_factory):
+    result, _ = with_deaths(tmp_path_factory.getbasetemp())
     assert 0 < len(result.failures) < 6
-    assert {failure.manager for failure in result.failures} == {manager}
+    assert {failure.manager for failure in result.failures} == {DIES}
     for failure in result.failures:
         assert (
             failure.cause
             == "its worker process ended with status -9, 3 times (killed, or out of memory?)"
         )
-        assert not failure.lasting
+
+
+def test_a_mission_that_kills_workers_may_be_tried_again(tmp_path_factory):
+    result, _ = with_deaths(tmp_path_factory.getbasetemp())
+    assert not any(failure.lasting for failure in result.failures)
+
+
+def test_missions_that_kill_workers_cost_no_other_mission(tmp_path_factory):
+    result, out = with_deaths(tmp_path_factory.getbasetemp())
     assert result.done + len(result.failures) == 24
-    rows = rows_of(tmp_path / "out")
-    assert [row["run"] for row in rows if row["manager"] == "none"] == [
+    assert [row["run"] for row in rows_of(out) if row["manager"] == "none"] == [
         str(run) for run in range(1, 13)
     ]
 
@@ -99,17 +126,27 @@ def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path):
         run_campaign("seams2023", [f"{AWKWARD}:DiesAlways"], 20, 1, 2, tmp_path / "out")
 
 
+@functools.cache
+def with_hangs(workers: int) -> CampaignResult:
+    """Fly a campaign of which some missions take too long."""
+    managers = [f"{AWKWARD}:HangsInSome", "none"]
+    return run_campaign("seams2023", managers, 12, 1, workers, time_out_s=2.0)
+
+
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers):
-    result = run_campaign(
-        "seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0
-    )
-    assert 0 < len(result.failures) < 12
-    for failure in result.failures:
+def test_a_mission_that_takes_too_long_has_failed(workers):
+    failures = with_hangs(workers).failures
+    assert 0 < len(failures) < 12
+    for failure in failures:
         told = f"{AWKWARD}:HangsInSome, run {failure.run}, mission time 50.00 s: not done after 2 s (time-out), in adapt"
         assert re.fullmatch(
             f"manager {re.escape(told)} \\(awkward_managers.py, line \\d+\\)", str(failure)
         )
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_missions_that_take_too_long_cost_no_other_mission(workers):
+    result = with_hangs(workers)
     assert result.done == 24 - len(result.failures)
 
 
@@ -155,9 +192,7 @@ def test_a_manager_whose_missions_all_take_too_long_is_given_up(workers, tmp_pat
     )
 
 
-def test_that_it_was_given_up_is_forgotten_when_it_is_resumed_and_other_remarks_are_not(
-    tmp_path, monkeypatch
-):
+def test_of_the_remarks_resuming_forgets_only_that_a_manager_was_given_up(tmp_path, monkeypatch):
     (tmp_path / "loops.py").write_text(LOOPS)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -170,10 +205,10 @@ def test_that_it_was_given_up_is_forgotten_when_it_is_resumed_and_other_remarks_
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch):
-    monkeypatch.setattr(workers, "_MARGIN_S", 2.0)
-    result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
+    monkeypatch.setattr(workers, "_MARGIN_S", 1.0)
+    result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=4.0)
     assert [(failure.run, failure.cause) for failure in result.failures] == [
-        (2, "not done after 8 s (time-out)")
+        (2, "not done after 4 s (time-out)")
     ]
     assert result.done == 2
 
@@ -197,14 +232,25 @@ def test_missions_run_in_as_many_processes_as_asked_for():
     assert 1 <= len(processes) <= 2
 
 
-def test_overwriting_replaces_results_and_leaves_other_files(tmp_path):
-    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
-    (tmp_path / "out" / "notes.txt").write_text("mine")
-    run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
-    assert len(rows_of(tmp_path / "out")) == 2
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv")
-    ]
+@pytest.fixture(scope="module")
+def overwritten(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a campaign in place of another, in which the user had a file."""
+    out = tmp_path_factory.mktemp("overwritten") / "out"
+    run_campaign("seams2023", ["none"], 1, 1, out=out, suave_format=True)
+    (out / "notes.txt").write_text("mine")
+    run_campaign("seams2023", ["none"], 2, 1, out=out, overwrite=True)
+    return out
+
+
+def test_overwriting_replaces_results(overwritten):
+    assert len(rows_of(overwritten)) == 2
+    assert {path.name for path in overwritten.iterdir()} - {"notes.txt"} == {
+        *("campaign.sqlite", "manifest.json", "runs.csv", "summary.csv")
+    }
+
+
+def test_overwriting_leaves_other_files(overwritten):
+    assert (overwritten / "notes.txt").read_text() == "mine"
 
 
 def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path, monkeypatch):
@@ -218,8 +264,9 @@ def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path, monkeypatch)
         return file
 
     monkeypatch.setattr(Path, "open", full)
-    with pytest.raises(InputError, match=r"No space left on device .*--resume .* writes the files"):
+    with pytest.raises(InputError, match="No space left on device") as full_disk:
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
+    assert "--resume" in full_disk.value.remedy
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["campaign.sqlite"]
     monkeypatch.undo()
     resume_campaign(tmp_path / "out")
@@ -297,16 +344,28 @@ def test_that_the_first_run_compiles_is_said_where_no_machine_code_is_kept(
 
 
 class TestLines:
-    @pytest.mark.parametrize("is_dumb", [False, True])
-    def test_a_long_one_has_some_and_a_last_one(
-        self, is_dumb: bool, screen: Screen, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        screen.is_terminal = is_dumb
+    @pytest.fixture(params=[False, True], ids=["a file", "a dumb terminal"])
+    def lines(
+        self,
+        request: pytest.FixtureRequest,
+        screen: Screen,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> list[str]:
+        """What is written of a long campaign."""
+        screen.is_terminal = request.param
         monkeypatch.setenv("TERM", "dumb")
         monkeypatch.setattr(display, "_FIRST_LINE_S", 0.0)
-        first, *_, last = shown_on(screen, "my\x1b[2Kfile.yaml").splitlines()
-        assert first.startswith("suave-des: my?[2Kfile.yaml: ")
-        assert re.match(r"suave-des: my\?\[2Kfile.yaml: 40 of 80 missions, 1 failed(,|$)", last)
+        lines = shown_on(screen, "my\x1b[2Kfile.yaml").splitlines()
+        assert len(lines) > 1
+        return lines
+
+    def test_begin_with_the_campaign_without_its_control_characters(self, lines: list[str]) -> None:
+        assert all(
+            line.startswith("suave-des: my?[2Kfile.yaml: ") for line in (lines[0], lines[-1])
+        )
+
+    def test_end_with_the_last_state(self, lines: list[str]) -> None:
+        assert re.search(r": 40 of 80 missions, 1 failed(,|$)", lines[-1])
 
 
 STUCK = """
@@ -351,7 +410,7 @@ def stuck(tmp_path, monkeypatch):
 
 @pytest.mark.usefixtures("stuck")
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_reasoner_that_does_not_come_back_costs_its_mission_and_at_most_the_next(workers):
+def test_a_reasoner_that_does_not_come_back_costs_two_missions_at_most(workers):
     runs = 12
     stuck_in = sum(Streams(1, run).stream("manager/awkward").random() < 0.1 for run in range(1, 13))
     result = run_campaign("seams2023", ["stuck_managers:StuckInSome"], runs, 1, workers)

@@ -3,6 +3,7 @@ manifest says.
 """
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,13 @@ runs: 2
 
 
 @pytest.fixture
-def experiment(tmp_path: Path) -> Path:
-    """A folder with a campaign file, and a manager's module with one that it imports."""
+def experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a campaign file, and a manager's module with one that it imports, which are not
+    loaded yet, nor told of.
+    """
+    monkeypatch.setattr("suave_des.user_code._told", set())
+    for name in ("high", "height"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     folder = tmp_path / "experiment"
     folder.mkdir()
     (folder / "campaign.yaml").write_text(CAMPAIGN)
@@ -44,23 +50,33 @@ def manifest(folder: Path) -> dict:
     return json.loads((folder / "manifest.json").read_text())
 
 
-def test_a_manager_beside_the_campaign_file_is_found_from_elsewhere(experiment):
+IN_ONE = ("campaign", "../experiment/campaign.yaml", "--workers", "1", "--out", "one")
+
+
+def test_a_manager_beside_the_campaign_file_is_found_from_elsewhere(experiment, caplog):
     elsewhere = experiment.parent / "elsewhere"
-    for workers in ("1", "2"):
-        asked = ("../experiment/campaign.yaml", "--workers", workers, "--out", workers)
-        done = suave_des_command("campaign", *asked, cwd=elsewhere)
-        assert done.returncode == 0, done.stderr
-        assert "has the code of high:High (../experiment/high.py) run" in done.stderr
-    runs = [(elsewhere / workers / "runs.csv").read_bytes() for workers in ("1", "2")]
-    assert runs[0] == runs[1] and runs[0].count(b"high:High") == 2
+    done = command_here(*IN_ONE, cwd=elsewhere)
+    assert done.returncode == 0, done.stderr
+    assert "has the code of high:High (../experiment/high.py) run" in caplog.text
+    assert (elsewhere / "one" / "runs.csv").read_text().count("high:High") == 2
 
 
-def test_of_two_managers_of_one_name_the_current_folder_s_is_run(experiment):
+def test_workers_find_it_too(experiment):
+    elsewhere = experiment.parent / "elsewhere"
+    command_here(*IN_ONE, cwd=elsewhere)
+    in_two = ("../experiment/campaign.yaml", "--workers", "2", "--out", "two")
+    done = suave_des_command("campaign", *in_two, cwd=elsewhere)
+    assert done.returncode == 0, done.stderr
+    one, two = ((elsewhere / name / "runs.csv").read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+def test_of_two_managers_of_one_name_the_current_folder_s_is_run(experiment, caplog):
     elsewhere = experiment.parent / "elsewhere"
     (elsewhere / "high.py").write_text(MANAGER.replace("from height import HIGH", "HIGH = 'no'"))
     asked = ("../experiment/campaign.yaml", "--runs", "1", "--out", "out")
-    done = suave_des_command("campaign", *asked, cwd=elsewhere)
-    assert "the code of high:High (high.py) run" in done.stderr
+    command_here("campaign", *asked, cwd=elsewhere)
+    assert "the code of high:High (high.py) run" in caplog.text
 
 
 @pytest.mark.parametrize("asked", [("--runs", "2"), ("--runs=2",), ()], ids=" ".join)

@@ -12,7 +12,7 @@ from suave_des import InputError, NoManager, Simulator, load_scenario, run_campa
 from suave_des.campaign.campaign import train
 from suave_des.learned import Learned, read_file
 from tests.helpers import AWKWARD, OUTSIDE
-from tests.helpers.command import command_here, suave_des_command
+from tests.helpers.command import suave_des_command
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
@@ -60,14 +60,25 @@ def test_a_campaign_on_missions_of_the_training_says_so(learner, given, runs, se
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"suave_des_learned": 2, "learned": {}}'])
 def test_another_file_is_no_policy(learner, content):
     Path("policy.json").write_text(content)
-    with pytest.raises(InputError, match=r"policy\.json"):
+    with pytest.raises(InputError) as refused:
         run_campaign(
             "seams2023", [learner], 1, manager_options={learner: {"learned": "policy.json"}}
         )
+    assert refused.value.file == "policy.json"
 
 
-def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path):
-    with pytest.raises(InputError, match="has learned nothing"):
+@pytest.mark.parametrize("change", [{"missions": "x"}, {"missions": 0}, {"seed": 1.5}])
+def test_a_training_result_with_a_value_of_another_type_is_no_policy(change, tmp_path):
+    result = Learned("mine:M", "seams2023", 0, 3, {}, {"q": 1.0})
+    path = tmp_path / "policy.json"
+    path.write_text(json.dumps({**json.loads(result.text()), **change}))
+    with pytest.raises(InputError) as refused:
+        read_file(path)
+    assert refused.value.file == str(path)
+
+
+def test_a_manager_that_learns_nothing_leaves_no_policy(tmp_path):
+    with pytest.raises(InputError):
         train("seams2023", "none", 1, tmp_path / "policy.json")
     assert not (tmp_path / "policy.json").exists()
 
@@ -75,7 +86,7 @@ def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path):
 @pytest.mark.parametrize("learned", [{1: 2.0}, {"arms": ({3: 1},)}, (deep := {})])
 def test_what_json_would_change_is_no_training_result(learned):
     deep["deep"] = deep
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError):
         Learned("mine", "seams2023", 1, 1, {}, learned).text()
 
 
@@ -87,13 +98,13 @@ def test_a_class_that_keeps_something_from_mission_to_mission_is_found_out(worke
     assert any("number of workers" in remark for remark in frame.attrs["remarks"])
 
 
-def test_a_class_that_keeps_nothing_and_reads_what_there_may_be_is_not():
-    for manager, runs in (
-        (f"{AWKWARD}:RaisesInHalf", 1),
-        (f"{AWKWARD}:SavesCharge", 2),
-        (f"{OUTSIDE}:Deliberate", 20),
-    ):
-        assert "remarks" not in run_campaign("seams2023", [manager], runs).attrs
+@pytest.mark.parametrize(
+    ("manager", "runs"),
+    [(f"{AWKWARD}:RaisesInHalf", 1), (f"{AWKWARD}:SavesCharge", 2), (f"{OUTSIDE}:Deliberate", 20)],
+)
+def test_a_class_that_keeps_nothing_is_not_accused_of_it(manager, runs):
+    """Nor of names that nothing measures, where it reads what there may be."""
+    assert "remarks" not in run_campaign("seams2023", [manager], runs).attrs
 
 
 class Swaps(NoManager):
@@ -146,62 +157,6 @@ def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too():
     seed = next(seed for seed, runs in has_remark.items() if runs == [False, True])
     with pytest.warns(UserWarning, match=r"measured\('visibility'\)"):
         run_campaign("seams2023", [manager], 2, seed)
-
-
-@pytest.mark.parametrize(
-    ("body", "status", "words"),
-    [
-        (
-            "def __init__(self, system): self.mine = system",
-            3,
-            "__init__ does not begin with super().__init__(system)",
-        ),
-        ("def diagnostic(self, kind, value): pass", 2, "write def diagnostic(self, diagnostic)"),
-        ("def task_request(self, task): pass", 2, "did you mean def task_requested(self, task)?"),
-        ("adapt = 3", 2, "write def adapt(self)"),
-        ("period_s = 1.0; adapt = endless", 3, "no mission time passed"),
-        (
-            "def diagnostic(self, diagnostic): yield self.system.env.timeout(1.0)",
-            2,
-            "only adapt may yield",
-        ),
-        ("async def task_requested(self, task): pass", 2, "write def task_requested(self, task)"),
-        (
-            "period_s = 1.0; adapt = lambda self: 'fd_spiral_low'",
-            3,
-            "adapt returned 'fd_spiral_low'; it may",
-        ),
-        (
-            "period_s = '2'; adapt = endless",
-            3,
-            "period_s is '2', starts_s is 0.0; they must be numbers",
-        ),
-        ("period_s = 1.0; starts_s = -50.0; adapt = endless", 3, "starts_s is -50.0"),
-        (
-            "period_s = 1.0; adapt = endless; depends_on = ['water_visibility']",
-            3,
-            "depends_on is ['water_visi",
-        ),
-        (
-            "depends_on = {'water_visiblity': (3.25,)}",
-            3,
-            "depends_on is {'water_visiblity': (3.25,)}; it must be like",
-        ),
-        ("subscribes_to = ('visibility',)", 2, "subscribes_to is ('visibility',)"),
-        ("def check(self, loaded): pass", 2, "write @classmethod def check(cls, loaded)"),
-        (
-            "input_files = classmethod(lambda cls, settings: [settings['table']])",
-            2,
-            "--manager-option NAME=VALUE",
-        ),
-    ],
-)
-def test_mistakes_in_a_class_are_reported_early(tmp_path, body, status, words):
-    endless = "def endless(self):\n    while True:\n        yield self.system.env.timeout(0.0)\n"
-    text = f"from suave_des.managing.base import ManagingSubsystem\n{endless}class M(ManagingSubsystem):\n    {body}\n"
-    (tmp_path / "mistakes.py").write_text(text)
-    done = command_here("run", "seams2023", "--manager", "mistakes:M", cwd=tmp_path)
-    assert done.returncode == status and words in done.stderr and "Traceback" not in done.stderr
 
 
 def installed(package: Path, where: Path) -> Path:
@@ -263,12 +218,3 @@ def test_the_example_learns_a_policy_that_beats_bt_on_missions_that_it_has_not_s
     ).confidence_interval
     print(f"{gain_s.mean():.1f} s sooner, 95% interval {interval.low:.1f} to {interval.high:.1f}")
     assert interval.low > 10.0
-
-
-@pytest.mark.parametrize("change", [{"missions": "x"}, {"missions": 0}, {"seed": 1.5}])
-def test_a_training_result_with_a_value_of_another_type_is_refused(change, tmp_path):
-    result = Learned("mine:M", "seams2023", 0, 3, {}, {"q": 1.0})
-    path = tmp_path / "policy.json"
-    path.write_text(json.dumps({**json.loads(result.text()), **change}))
-    with pytest.raises(InputError, match="is not a file that suave-des train has written"):
-        read_file(path)

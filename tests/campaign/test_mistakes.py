@@ -73,7 +73,7 @@ def test_shipped_files_are_not_even_checked(scenario, tmp_path, monkeypatch):
     campaign(tmp_path, scenario=scenario, managers="metacontrol")
 
 
-def test_the_same_files_are_checked_once_and_changed_ones_again(
+def test_files_are_checked_again_only_when_they_were_changed(
     tmp_path, wrong_rule, monkeypatch, caplog
 ):
     checks: list[Subject] = []

@@ -7,14 +7,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import pandas
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.missions import Campaign
+from suave_des.campaign.results import CampaignResult
 from suave_des.campaign.variation import Sweep, vary
-from suave_des.errors import InputError
 from suave_des.records.mission_folder import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.records.store import STORE_FILE, MissionKey
 from suave_des.scenario.loader import load_scenario, with_values
@@ -31,25 +32,20 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path):
-    path = write(tmp_path, HEAD)
-    result = run_campaign(path)
-    assert (
-        result.campaign.spec.managers,
-        result.campaign.spec.runs,
-        result.campaign.spec.seed,
-    ) == (
-        ("none", "random"),
-        4,
-        7,
-    )
+def asked_for(result: CampaignResult) -> tuple[tuple[str, ...], int, int]:
+    """Managers, runs and seed of a campaign."""
+    spec = result.campaign.spec
+    return spec.managers, spec.runs, spec.seed
+
+
+def test_a_campaign_file_says_what_is_run(tmp_path):
+    result = run_campaign(write(tmp_path, HEAD))
+    assert asked_for(result) == (("none", "random"), 4, 7)
     assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
-    other = run_campaign(path, ["none"], 2, 8)
-    assert (other.campaign.spec.managers, other.campaign.spec.runs, other.campaign.spec.seed) == (
-        ("none",),
-        2,
-        8,
-    )
+
+
+def test_options_go_before_a_campaign_file(tmp_path):
+    assert asked_for(run_campaign(write(tmp_path, HEAD), ["none"], 2, 8)) == (("none",), 2, 8)
 
 
 def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_path):
@@ -65,7 +61,7 @@ def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_
     )
 
 
-def test_a_grid_combines_each_with_each_and_the_last_named_changes_fastest():
+def test_a_grid_is_every_combination_the_last_named_changing_fastest():
     sweep = Sweep(grid={"a": [1, 2], "b": [3, 4, 5]}, zip={"c": [6, 7], "d": [8, 9]})
     points = [tuple(sweep.values(point).values()) for point in range(sweep.points)]
     assert points == [
@@ -82,28 +78,61 @@ def test_points_with_each_value_have_each_value(sizes):
         assert {point[path] for point in met} == set(values)
 
 
-def test_perturbations_are_the_same_for_all_managers_and_points_and_within_their_bounds(tmp_path):
+@pytest.fixture(scope="module")
+def perturbed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
+    """Rows of a sweep in which two values are drawn."""
+    folder = tmp_path_factory.mktemp("perturbed")
     perturbations = f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n  visibility.shift_s: {UNIFORM % (-9, 9)}\n"
-    path = write(tmp_path, HEAD + perturbations + "sweep:\n  visibility.period_s: [40, 120]\n")
-    run_campaign(path, out=tmp_path / "out")
-    rows = rows_of(tmp_path / "out")
-    by_run: dict[str, set[tuple[str, str]]] = {}
-    for row in rows:
-        by_run.setdefault(row["run"], set()).add((row["start.x_m"], row["visibility.shift_s"]))
-        assert round(float(row["start.x_m"]), 6) == float(row["initial_x_m"])
-        assert -18 <= float(row["start.x_m"]) <= -16
-        assert -9 <= float(row["visibility.shift_s"]) <= 9
-    assert all(len(drawn) == 1 for drawn in by_run.values())
-    assert len({next(iter(drawn)) for drawn in by_run.values()}) == 4
+    path = write(folder, HEAD + perturbations + "sweep:\n  visibility.period_s: [40, 120]\n")
+    run_campaign(path, out=folder / "out")
+    return rows_of(folder / "out")
 
 
-def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path):
+class TestPerturbations:
+    @pytest.fixture
+    def by_run(self, perturbed: list[dict[str, str]]) -> list[set[tuple[str, str]]]:
+        """What was drawn in the missions of each run."""
+        drawn: dict[str, set[tuple[str, str]]] = {}
+        for row in perturbed:
+            drawn.setdefault(row["run"], set()).add((row["start.x_m"], row["visibility.shift_s"]))
+        return list(drawn.values())
+
+    def test_are_the_same_in_all_missions_of_a_run(self, by_run):
+        assert [len(drawn) for drawn in by_run] == [1] * 4
+
+    def test_differ_from_run_to_run(self, by_run):
+        assert len(set.union(*by_run)) == 4
+
+    def test_are_those_of_the_mission(self, perturbed):
+        for row in perturbed:
+            assert round(float(row["start.x_m"]), 6) == float(row["initial_x_m"])
+
+    @pytest.mark.parametrize(
+        ("name", "least", "most"), [("start.x_m", -18, -16), ("visibility.shift_s", -9, 9)]
+    )
+    def test_are_within_their_bounds(self, perturbed, name, least, most):
+        assert all(least <= float(row[name]) <= most for row in perturbed)
+
+
+@pytest.fixture(scope="module")
+def shared_draws(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[pandas.DataFrame, pandas.DataFrame]:
+    """Missions of runs of which three in a row share a draw, and of runs that share none."""
     text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
-    shared = run_campaign(write(tmp_path, text + "runs_per_draw: 3\n"), ["none"], 7).frame()
-    single = run_campaign(write(tmp_path, text), ["none"], 7).frame()
+    path = write(tmp_path_factory.mktemp("draws"), text + "runs_per_draw: 3\n")
+    shared = run_campaign(path, ["none"], 7).frame()
+    return shared, run_campaign(write(path.parent, text), ["none"], 7).frame()
+
+
+def test_runs_in_a_row_may_share_what_is_drawn(shared_draws):
+    shared, single = shared_draws
     firsts = [1, 1, 1, 4, 4, 4, 7]
     assert list(shared["start.x_m"]) == [single["start.x_m"][first - 1] for first in firsts]
-    # drawn by the scenario, each run its own
+
+
+def test_runs_that_share_a_draw_share_nothing_that_the_scenario_draws(shared_draws):
+    shared, single = shared_draws
     assert list(shared["initial_y_m"]) == list(single["initial_y_m"])
 
 
@@ -156,75 +185,35 @@ def test_more_points_managers_or_noise_change_no_other_row(seed, periods):
     assert alone == {row[:-2] for row in rows(["none"], 1, periods, perturbations=noisier)}
 
 
-@pytest.mark.usefixtures("quick_workers")
-def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(tmp_path):
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a campaign file, with the results of its sweep in one process in `out`."""
+    folder = tmp_path_factory.mktemp("whole")
     text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
-    path = write(tmp_path, text + "sweep: {visibility.period_s: [40, 50, 70, 90]}\n")
-    run_campaign(path, workers=1, out=tmp_path / "one")
-    run_campaign(path, workers=2, out=tmp_path / "two")
-    run_campaign(path, runs=2, out=tmp_path / "resumed")
-    resume_campaign(tmp_path / "resumed", runs=4)
-    whole = (tmp_path / "one" / "runs.csv").read_bytes()
-    assert (
-        whole
-        == (tmp_path / "two" / "runs.csv").read_bytes()
-        == (tmp_path / "resumed" / "runs.csv").read_bytes()
-    )
-    summaries = [
-        (tmp_path / name / "summary.csv").read_bytes() for name in ("one", "two", "resumed")
-    ]
-    assert len(set(summaries)) == 1 and summaries[0].count(b"\n") == 1 + 4 * 2
+    path = write(folder, text + "sweep: {visibility.period_s: [40, 50, 70, 90]}\n")
+    run_campaign(path, workers=1, out=folder / "out")
+    return folder
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: "),
-        ("campaign: 1\n", "scenario: is missing"),
-        (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
-        (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
-        (
-            HEAD + "sweep:\n  visibility.period_s: 40\n",
-            "line 7, sweep.visibility.period_s: 40 should be a list",
-        ),
-        (
-            HEAD + "sweep:\n  visibility.period_s: [40, -3]\n",
-            "line 7, sweep.visibility.period_s: at",
-        ),
-        (
-            HEAD + "sweep:\n  visibility.period_s: [40, 3, 40.0]\n",
-            "line 7, sweep.visibility.period_s: has a poi",
-        ),
-        (HEAD + "sweep:\n  zip: {start.x_m: [1, 1], start.y_m: [2, 2.0]}\n", "has a point twice"),
-        (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
-        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: unknown key"),
-        (
-            HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n",
-            "start.x_m has 1, start.y_m has 2",
-        ),
-        (
-            HEAD + "perturbations:\n  start.x_m: 3\n",
-            "line 7, perturbations.start.x_m: expected a distribution, got 3",
-        ),
-        (
-            HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n",
-            "is drawn at each use, not once",
-        ),
-        (
-            HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n",
-            "line 7, perturbations.mission.ti",
-        ),
-        (
-            HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n",
-            "varies start.x_m, as",
-        ),
-    ],
-)
-def test_bad_campaign_files(tmp_path, text, message):
-    with pytest.raises(InputError) as raised:
-        run_campaign(write(tmp_path, text), out=tmp_path / "out")
-    assert message in str(raised.value) and str(raised.value).startswith(str(tmp_path))
-    assert not (tmp_path / "out").exists()
+def assert_has_the_bytes_of(whole: Path, out: Path) -> None:
+    for name in ("runs.csv", "summary.csv"):
+        assert (out / name).read_bytes() == (whole / "out" / name).read_bytes()
+
+
+def test_the_summary_of_a_sweep_has_a_row_for_each_manager_at_each_point(whole):
+    assert len(rows_of(whole / "out" / "summary.csv")) == 4 * 2
+
+
+@pytest.mark.usefixtures("quick_workers")
+def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers(whole, tmp_path):
+    run_campaign(whole / "campaign.yaml", workers=2, out=tmp_path)
+    assert_has_the_bytes_of(whole, tmp_path)
+
+
+def test_a_sweep_gives_the_same_bytes_when_it_is_resumed(whole, tmp_path):
+    run_campaign(whole / "campaign.yaml", runs=2, out=tmp_path)
+    resume_campaign(tmp_path, runs=4)
+    assert_has_the_bytes_of(whole, tmp_path)
 
 
 def test_a_failure_in_a_sweep_names_its_point(tmp_path):
@@ -238,41 +227,47 @@ def test_a_failure_in_a_sweep_names_its_point(tmp_path):
     )
 
 
-@pytest.mark.usefixtures("quick_workers")
-def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_bytes(tmp_path):
-    sweep = {"visibility.period_s": [40.0, 80.0]}
-    managers = ["none", "metacontrol"]
-
-    def run(runs: int, workers: int, out: Path) -> bytes:
-        run_campaign(
-            "seams2023", managers, runs, 3, workers, out, sweep=sweep, record_knowledge=True
-        )
-        return (out / CAMPAIGN_KNOWLEDGE_FILE).read_bytes()
-
-    whole = run(3, 1, tmp_path / "whole")
-    assert run(3, 2, tmp_path / "two") == whole
-    run(1, 1, tmp_path / "resumed")
-    resume_campaign(tmp_path / "resumed", runs=3)
-    assert (tmp_path / "resumed" / CAMPAIGN_KNOWLEDGE_FILE).read_bytes() == whole
-
-    missions = list(read_missions(tmp_path / "whole" / CAMPAIGN_KNOWLEDGE_FILE))
-    assert [(each.manager, each.point, each.run) for each in missions] == [
-        ("metacontrol", point, run) for point in (0, 1) for run in (1, 2, 3)
-    ]
-    loaded = with_values(load_scenario("seams2023"), {"signals.water_visibility.period_s": 80.0})
-    alone = Simulator(loaded).run("metacontrol", 2, 3, record=True).knowledge
-    assert [each.state for each in missions[4].records] == [each.state for each in alone]
-    plain = run_campaign("seams2023", managers, 3, 3, sweep=sweep)
-    assert (
-        run_campaign("seams2023", managers, 3, 3, sweep=sweep, record_knowledge=True).rows
-        == plain.rows
-    )
+STATES = {"sweep": {"visibility.period_s": [40.0, 80.0]}, "record_knowledge": True}
+OF_STATES = "seams2023", ["none", "metacontrol"]
 
 
-def test_a_key_without_its_section_is_told_with_it(tmp_path):
-    path = write(tmp_path, HEAD + "sweep:\n  metacontrol.reasoning_period_s: [1, 2]\n")
-    with pytest.raises(InputError, match=r"line 7, .*did you mean managers\.metacontrol or"):
-        run_campaign(path)
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[CampaignResult, Path]:
+    """A sweep whose knowledge states are kept, and their file."""
+    out = tmp_path_factory.mktemp("states") / "out"
+    return run_campaign(*OF_STATES, 3, 3, 1, out, **STATES), out / CAMPAIGN_KNOWLEDGE_FILE
+
+
+class TestKnowledgeStates:
+    @pytest.mark.usefixtures("quick_workers")
+    def test_have_the_same_bytes_on_any_number_of_workers(self, recorded, tmp_path):
+        run_campaign(*OF_STATES, 3, 3, 2, tmp_path, **STATES)
+        _, file = recorded
+        assert (tmp_path / CAMPAIGN_KNOWLEDGE_FILE).read_bytes() == file.read_bytes()
+
+    def test_have_the_same_bytes_when_the_campaign_is_resumed(self, recorded, tmp_path):
+        run_campaign(*OF_STATES, 1, 3, 1, tmp_path, **STATES)
+        resume_campaign(tmp_path, runs=3)
+        _, file = recorded
+        assert (tmp_path / CAMPAIGN_KNOWLEDGE_FILE).read_bytes() == file.read_bytes()
+
+    def test_are_kept_of_each_mission_that_has_some(self, recorded):
+        _, file = recorded
+        assert [(each.manager, each.point, each.run) for each in read_missions(file)] == [
+            ("metacontrol", point, run) for point in (0, 1) for run in (1, 2, 3)
+        ]
+
+    def test_are_those_that_run_keeps(self, recorded):
+        _, file = recorded
+        values = {"signals.water_visibility.period_s": 80.0}
+        simulator = Simulator(with_values(load_scenario("seams2023"), values))
+        alone = simulator.run("metacontrol", 2, 3, record=True).knowledge
+        kept = list(read_missions(file))[4].records
+        assert [each.state for each in kept] == [each.state for each in alone]
+
+    def test_change_no_row(self, recorded):
+        result, _ = recorded
+        assert run_campaign(*OF_STATES, 3, 3, sweep=STATES["sweep"]).rows == result.rows
 
 
 SETTINGS = {
@@ -301,21 +296,32 @@ def planned(campaign: Campaign) -> list[MissionKey]:
     return list(campaign.missions(lambda point, manager: ()))
 
 
-def test_they_are_run_once_and_have_a_row_at_each_point():
+@pytest.fixture(scope="module")
+def swept_settings() -> CampaignResult:
+    """A sweep of settings of which each manager may read some."""
     sweep = {"visibility.period_s": [40.0, 80.0], **SETTINGS}
-    found = run_campaign("seams2023", list(READ_BY), 2, sweep=sweep)
-    runs_of = Counter(found.campaign.spec.managers[key.manager] for key in planned(found.campaign))
+    return run_campaign("seams2023", list(READ_BY), 2, sweep=sweep)
+
+
+def test_missions_that_are_the_same_at_several_points_are_run_once(swept_settings):
+    managers = swept_settings.campaign.spec.managers
+    runs_of = Counter(managers[key.manager] for key in planned(swept_settings.campaign))
     assert runs_of == {name: 2 * 2 * 2**read for name, read in READ_BY.items()}
-    assert len(found.rows) == found.campaign.planned == 6 * 2 * 16
-    loaded = load_scenario("seams2023")
-    values = dict(zip(sweep, (80.0, 4.0, 10.0, 2.0), strict=True))
+
+
+def test_they_have_a_row_at_each_point(swept_settings):
+    assert len(swept_settings.rows) == swept_settings.campaign.planned == 6 * 2 * 16
+
+
+def test_a_row_is_the_mission_with_the_values_of_its_point(swept_settings):
     number = 2 * 6 * (8 + 4 + 1)
-    row = dict(zip(found.columns, found.rows[number + 3], strict=True))
-    paths = {"signals.water_visibility.period_s": 80.0, **{k: values[k] for k in SETTINGS}}
-    metrics = Simulator(with_values(loaded, paths)).run("random", 2, 1).metrics
-    assert {name: row[name] for name in sweep} == values
+    row = dict(zip(swept_settings.columns, swept_settings.rows[number + 3], strict=True))
+    values = dict(zip(("visibility.period_s", *SETTINGS), (80.0, 4.0, 10.0, 2.0), strict=True))
+    assert {name: row[name] for name in values} == values
     assert (row["manager"], row["run"]) == ("random", 2)
-    assert row["search_time_s"] == metrics.search_time_s
+    paths = {"signals.water_visibility.period_s": 80.0, **{k: values[k] for k in SETTINGS}}
+    simulator = Simulator(with_values(load_scenario("seams2023"), paths))
+    assert row["search_time_s"] == simulator.run("random", 2, 1).metrics.search_time_s
 
 
 def test_of_a_campaign_that_has_only_the_first_of_them_the_others_are_run(tmp_path):

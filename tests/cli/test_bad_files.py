@@ -156,6 +156,7 @@ def test_an_output_folder_that_may_not_be_written(command, tmp_path, monkeypatch
         ((*CAMPAIGN, "--format", "excel", "--out", "out"), "--format"),
         ((*CAMPAIGN,), "--out DIR is missing"),
         (("campaign", "--out", "out"), "SCENARIO is missing"),
+        ((*CAMPAIGN, "--managers", "none", "bt", "--out", "o"), "names have commas between them"),
         (("campaign", "--resume", "out", "--seed", "0"), "--seed cannot be used with --resume"),
         (("campaign", "seams2023", "--resume", "out"), "SCENARIO cannot be used with --resume"),
         (("campain",), "Did you mean 'campaign'?"),
@@ -163,6 +164,20 @@ def test_an_output_folder_that_may_not_be_written(command, tmp_path, monkeypatch
         (("campaign", "--resume", "folder"), "there is no campaign in it"),
         (("campaign", "--resume", "file"), "there is no campaign in it"),
         (("schema", "extra"), "extra"),
+        (
+            (
+                "kb",
+                "test",
+                "--coverage",
+                "--write",
+                "new.yaml",
+                "--set",
+                "knowledge.reasoner=pellet",
+            ),
+            "name it with --scenario",
+        ),
+        (("kb", "check", "--rules", "pipe"), "is not a regular file"),
+        (("kb", "check", "--ontology", "pipe"), "is not a regular file"),
         (("figure", "file", "--out", "m.png"), "file: line 1: has no column 'manager'"),
     ],
 )
@@ -173,13 +188,14 @@ def test_in_place_of_a_number_or_a_name(command, tmp_path, arguments, words):
 @pytest.mark.parametrize(
     "text",
     [
-        b"base: seams2023.yaml\r\nmission:\r\n  time_limit_s: 1e1\r\n",
-        b"\xef\xbb\xbfbase: seams2023.yaml\nmission: {time_limit_s: 1E1}\n",
+        b"base: seams2023.yaml\r\nmission:\r\n  time_limit_s: 10\r\n",
+        b"\xef\xbb\xbfbase: seams2023.yaml\nmission: {time_limit_s: 10}\n",
+        b"base: seams2023.yaml\nmission: {time_limit_s: 1e1}\n",
+        b"base: seams2023.yaml\nmission: {time_limit_s: 1E1}\n",
     ],
+    ids=["line ends of Windows", "byte order mark", "scientific", "scientific in capitals"],
 )
-def test_windows_line_ends_a_byte_order_mark_and_scientific_notation_are_fine(
-    command, tmp_path, text
-):
+def test_a_scenario_may_be_written_as_editors_do(command, tmp_path, text):
     (tmp_path / "fine.yaml").write_bytes(text)
     status, out, error = command("run", "fine.yaml", "--manager", "none")
     assert (status, error) == (0, "")

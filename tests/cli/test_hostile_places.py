@@ -55,30 +55,51 @@ def run(
 
 @pytest.fixture
 def small_loop(tmp_path: Path) -> list[str]:
-    """A command that compiles one small function with the package, and prints 55.0."""
-    program = tmp_path / "small.py"
+    return small_loop_in(tmp_path)
+
+
+def small_loop_in(folder: Path) -> list[str]:
+    """Return a command that compiles one small function with the package, and prints 55.0."""
+    program = folder / "small.py"
     program.write_text(
         "import sys; sys.path[:0] = sys.argv[1:]\nfrom small_loop import total\nprint(total(10.0))\n"
     )
-    (tmp_path / "small_loop.py").write_text(
+    (folder / "small_loop.py").write_text(
         "from suave_des.compiling import compiled\n\n\n"
         "@compiled\ndef total(n):\n    s = 0.0\n    while n > 0.0:\n"
         "        s += n\n        n -= 1.0\n    return s\n"
     )
-    return [sys.executable, str(program), str(tmp_path), str(CHECKOUT)]
+    return [sys.executable, str(program), str(folder), str(CHECKOUT)]
+
+
+@pytest.fixture(scope="module")
+def replaced(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """What a command says where the folder cannot be made, and the one in its place."""
+    temporary = tmp_path_factory.mktemp("temporary")
+    done = run(
+        command=small_loop_in(tmp_path_factory.mktemp("program")),
+        HOME="/dev/null/home",
+        XDG_CACHE_HOME="",
+        TMPDIR=str(temporary),
+    )
+    assert (done.returncode, done.stdout) == (0, "55.0\n")
+    (folder,) = temporary.glob("suave-des-*")
+    return done, folder
 
 
 class TestCacheFolder:
-    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(
-        self, tmp_path, small_loop
-    ):
-        done = run(
-            command=small_loop, HOME="/dev/null/home", XDG_CACHE_HOME="", TMPDIR=str(tmp_path)
-        )
-        assert (done.returncode, done.stdout) == (0, "55.0\n")
+    def test_that_cannot_be_made_is_told_once(self, replaced):
+        done, _ = replaced
         assert done.stderr.count("the cache folder cannot be used") == 1
-        (folder,) = tmp_path.glob("suave-des-*")
+
+    def test_in_its_place_is_for_the_user_alone(self, replaced):
+        _, folder = replaced
         assert folder.stat().st_mode & 0o777 == 0o700
+
+    def test_in_its_place_keeps_machine_code(self, replaced):
+        _, folder = replaced
         assert list(folder.rglob("*.nbc"))
 
     @pytest.mark.parametrize(
@@ -264,39 +285,62 @@ class TestStopped:
         assert interrupted > 7  # the others were too early or too late
 
 
+@pytest.fixture(scope="module")
+def unread(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, bytes, Path]:
+    """Exit status of a campaign whose output nobody reads, its errors, and its folder."""
+    folder = tmp_path_factory.mktemp("unread")
+    process = subprocess.Popen(
+        [*COMMAND, *CAMPAIGN, "--quiet"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    process.stdout.close()
+    told = process.stderr.read()
+    return process.wait(300), told, folder
+
+
 class TestOutput:
     def test_in_ascii_has_other_characters(self, tmp_path):
         done = run(*CAMPAIGN, PYTHONIOENCODING="ascii")
         assert done.returncode == 0
         assert " ? " in done.stdout and done.stdout.isascii()
 
-    def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path):
-        arguments = [*COMMAND, *CAMPAIGN, "--quiet"]
-        process = subprocess.Popen(
-            arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
-        process.stdout.close()
-        told = process.stderr.read()
-        assert process.wait(300) == 128 + signal.SIGPIPE
-        assert told == b""
-        assert (tmp_path / "out" / "runs.csv").is_file()
+    def test_that_nobody_reads_is_no_error(self, unread):
+        status, told, _ = unread
+        assert (status, told) == (128 + signal.SIGPIPE, b"")
+
+    def test_that_nobody_reads_costs_no_results(self, unread):
+        _, _, folder = unread
+        assert (folder / "out" / "runs.csv").is_file()
 
     def test_has_no_control_characters_of_others(self, command):
         assert "\x1b" not in command("run", "\x1b]0;owned\x07\x1b[31mred.yaml").err
         assert plain("a\x1b[31m\u202eb ± é\n") == "a\\x1b[31m\\u202eb ± é\n"
 
 
-def test_java_takes_no_options_from_the_environment_and_leaves_nothing_in_the_temporary_folder(
-    tmp_path,
-):
+@pytest.fixture(scope="module")
+def ended(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[subprocess.CompletedProcess[str], Path]:
+    """A command that starts it with options that it does not know, and its temporary folder."""
+    folder = tmp_path_factory.mktemp("java")
     options = {
         "JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption",
         "_JAVA_OPTIONS": "-XX:+NoSuchOption",
     }
     arguments = ["kb", "infer", "--reasoner", "pellet", "--at", "water_visibility=1"]
-    done = run(*arguments, TMPDIR=str(tmp_path), **options)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert not list(tmp_path.glob(".java_pid*"))
+    return run(*arguments, TMPDIR=str(folder), **options), folder
+
+
+class TestJava:
+    def test_takes_no_options_from_the_environment(self, ended):
+        done, _ = ended
+        assert (done.returncode, done.stderr) == (0, "")
+
+    def test_leaves_nothing_in_the_temporary_folder(self, ended):
+        _, folder = ended
+        assert not list(folder.glob(".java_pid*"))
 
 
 class TestLimits:
@@ -353,12 +397,6 @@ class TestLimits:
         assert done.returncode in (2, 3)
         assert "Traceback" not in done.stderr and "Too many open files" in done.stderr
 
-    @pytest.mark.parametrize("option", ["--rules", "--ontology"])
-    def test_a_pipe_in_place_of_a_file_is_not_waited_for(self, tmp_path, option, command):
-        os.mkfifo(tmp_path / "pipe")
-        status, out, error = command("kb", "check", option, "pipe")
-        assert status == 2 and "is not a regular file" in out + error
-
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which Linux has")
 @pytest.mark.parametrize("command", [["--help"], ["kb", "rules"], ONE_MISSION])
@@ -371,7 +409,7 @@ def test_output_to_a_full_disk_is_told_in_one_line(command, tmp_path):
     assert "the output cannot be written: No space left on device" in done.stderr
 
 
-def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path):
+def test_commands_use_a_folder_whose_name_is_no_utf_8(tmp_path):
     out = tmp_path / os.fsdecode(b"L\xe4ufe")
     try:
         out.mkdir()

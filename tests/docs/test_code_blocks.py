@@ -48,11 +48,19 @@ def test_blocks_show_what_they_print(page, tmp_path):
     blocks_show_what_they_print(page, tmp_path, quick=True)
 
 
-def test_a_block_whose_program_is_absent_is_left_and_the_others_are_run(tmp_path):
-    page = tmp_path / "page.md"
+def run_without_curl(folder):
+    """What the blocks of a page show, of which the first needs curl, where it is absent."""
+    page = folder / "page.md"
     page.write_text("```console needs=curl\n$ curl\nwas\n```\n```console\n$ echo is\nwas\n```\n")
-    done = run_page(page, tmp_path, quick=True, absent=["curl"])
-    assert [shown for _, shown in done] == ["$ curl\nwas\n", "$ echo is\nis\n"]
+    return [shown for _, shown in run_page(page, folder, quick=True, absent=["curl"])]
+
+
+def test_a_block_whose_program_is_absent_is_left(tmp_path):
+    assert run_without_curl(tmp_path)[0] == "$ curl\nwas\n"
+
+
+def test_a_block_after_one_whose_program_is_absent_is_run(tmp_path):
+    assert run_without_curl(tmp_path)[1:] == ["$ echo is\nis\n"]
 
 
 @pytest.mark.slow
@@ -92,10 +100,9 @@ class TestDiffering:
             ("mean 187.85\n", "mean 197.91\n", True),
             ("one\ntwo\n", "one\n", True),
         ],
+        ids=["word", "whole number", "decimal, slightly", "decimal", "line"],
     )
-    def test_a_word_a_whole_number_and_a_line_count_and_a_decimal_by_more_than_a_hundredth(
-        self, shown, real, counts
-    ):
+    def test_what_counts_as_another_output(self, shown, real, counts):
         assert differs(self.block(shown), real, quick=False) is counts
 
     def test_shorter_runs_keep_their_rows(self):
@@ -147,7 +154,7 @@ def test_pictures_are_small_pngs(picture):
 
 
 @pytest.mark.parametrize("name", ["--mode-follow", "--mode-low", "--bad", "--good"])
-def test_the_picture_of_two_missions_keeps_the_colours_of_lines_and_marks(name):
+def test_the_picture_of_two_missions_keeps_the_colours_of_what_it_shows(name):
     css = (ROOT / "suave_des" / "pages" / "assets" / "common.css").read_text(encoding="utf-8")
     wanted = bytes.fromhex(re.search(rf"{name}: #(\w{{6}})", css)[1])  # the first theme is light
     with Image.open(IMAGES / "replay-two.png") as picture:
@@ -186,7 +193,7 @@ def test_the_slurm_script_runs(tmp_path):
         time.sleep(0.1)
 
 
-def test_there_are_four():
+def test_there_are_four_notebooks():
     assert [path.stem for path in NOTEBOOKS] == [
         "first-campaign",
         "own-manager",
@@ -205,7 +212,7 @@ def kernel():
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_it_runs_and_shows_what_it_showed(path, kernel, tmp_path):
+def test_a_notebook_shows_what_it_showed(path, kernel, tmp_path):
     kept = list(shown(nbformat.read(path, as_version=4)))
     assert kept, "it was never run"
     for text, now in zip(kept, shown(executed(path, tmp_path, kernel)), strict=True):
@@ -214,11 +221,23 @@ def test_it_runs_and_shows_what_it_showed(path, kernel, tmp_path):
         )
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_the_page_on_the_site_has_every_cell_and_output(path):
-    notebook = nbformat.read(path, as_version=4)
-    page = notebook_markdown(notebook)
-    for cell in notebook.cells:
-        assert cell.source in page
-    assert page.count("data:image/png") == sum(text == "a picture\n" for text in shown(notebook))
-    assert "<style" not in page
+@pytest.fixture(scope="module", params=NOTEBOOKS, ids=lambda path: path.stem)
+def on_the_site(request):
+    """A notebook, and its page on the site."""
+    notebook = nbformat.read(request.param, as_version=4)
+    return notebook, notebook_markdown(notebook)
+
+
+class TestNotebookOnTheSite:
+    def test_has_every_cell(self, on_the_site):
+        notebook, page = on_the_site
+        assert not [cell.source for cell in notebook.cells if cell.source not in page]
+
+    def test_has_every_picture(self, on_the_site):
+        notebook, page = on_the_site
+        pictures = sum(text == "a picture\n" for text in shown(notebook))
+        assert page.count("data:image/png") == pictures
+
+    def test_brings_no_style_of_its_own(self, on_the_site):
+        _, page = on_the_site
+        assert "<style" not in page

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -206,13 +207,14 @@ def small_cluster(
     return _small_clusters[-1]
 
 
-def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
-    cluster, users_folder, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(users_folder)
-    asked = ("own.yaml", ["metacontrol", MINE], 60, 1)
-    run_campaign(*asked, out=tmp_path / "here")
-    seen: list[int] = []
+@pytest.fixture(scope="module")
+def flown_with_a_death(
+    cluster: Cluster, users_folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, int]:
+    """Folder of a campaign, of which a worker died and another came, and how many missions were
+    done by then.
+    """
+    out, seen = tmp_path_factory.mktemp("there") / "out", []
 
     def kill_one(progress: Progress) -> None:
         if not seen:
@@ -220,10 +222,27 @@ def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
             cluster.add_worker()
         seen.append(progress.done)
 
-    run_campaign(*asked, out=tmp_path / "there", scheduler=cluster.address, on_progress=kill_one)
+    with chdir(users_folder):
+        run_campaign(*OWN, out=out, scheduler=cluster.address, on_progress=kill_one)
+    return out, seen[0]
+
+
+OWN = ("own.yaml", ["metacontrol", MINE], 60, 1)
+
+
+def test_a_worker_that_dies_changes_no_byte(
+    flown_with_a_death, users_folder, tmp_path, monkeypatch
+):
+    there, done = flown_with_a_death
+    assert done < 60  # or it died too late to matter
+    monkeypatch.chdir(users_folder)
+    run_campaign(*OWN, out=tmp_path / "here")
     for name in ("runs.csv", "summary.csv", "manifest.json"):
-        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
-    assert seen[0] < 60  # or it died too late to matter
+        assert (there / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+
+
+@pytest.mark.usefixtures("flown_with_a_death")
+def test_workers_open_none_of_the_user_s_files(cluster):
     assert cluster.opened() == []
 
 
@@ -271,7 +290,7 @@ def test_ctrl_c_on_the_command_line(cluster, scenario, tmp_path):
     assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2
 
 
-def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):
+def test_what_was_begun_there_may_be_finished_here(cluster, scenario, tmp_path):
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt
 
@@ -291,14 +310,22 @@ def test_interrupted_there_and_resumed_here(cluster, scenario, tmp_path):
     ).read_bytes()
 
 
-def test_another_version_on_a_worker_is_named_and_nothing_is_written(
-    cluster, tmp_path, monkeypatch
-):
+@pytest.fixture
+def another_numpy(monkeypatch):
     here = {**dask_cluster.code_versions(), "numpy": "1.0"}
     monkeypatch.setattr(dask_cluster, "code_versions", lambda: here)
-    with pytest.raises(
-        InputError, match=r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"
-    ):
+
+
+@pytest.mark.usefixtures("another_numpy")
+def test_another_version_on_a_worker_is_named(cluster):
+    words = r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"
+    with pytest.raises(InputError, match=words):
+        run_campaign("seams2023", ["none"], 1, 1, scheduler=cluster.address)
+
+
+@pytest.mark.usefixtures("another_numpy")
+def test_where_a_worker_has_another_version_nothing_is_written(cluster, tmp_path):
+    with pytest.raises(InputError):
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", scheduler=cluster.address)
     assert not (tmp_path / "out").exists()
 
@@ -375,7 +402,3 @@ class TestBadInput:
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(InputError, match=r"\(pip install 'suave-des\[dask\]'\)"):
             run_campaign("seams2023", ["none"], 1, 1, scheduler="tcp://127.0.0.1:8786")
-
-    def test_workers_besides_a_scheduler(self):
-        with pytest.raises(InputError, match=r"workers: 2 cannot be used with a scheduler"):
-            run_campaign("seams2023", ["none"], 1, 1, 2, scheduler="tcp://127.0.0.1:8786")

@@ -359,7 +359,7 @@ def test_a_row_decides_where_a_narrower_one_asks_for_another_functions_design(ta
         decided(file, "fd_spiral_medium", c_thruster_1="FALSE")
 
 
-def test_a_blank_line_between_settings_and_header_is_skipped(table):
+def test_blank_lines_among_settings_are_skipped(table):
     file = Path(table(f"# latency_s: 0.25\n\n# period_s: 2\n\n{PLAIN}").removeprefix("table:"))
     settings = read_table(file).settings
     assert (settings.latency_s, settings.period_s) == (0.25, 2.0)

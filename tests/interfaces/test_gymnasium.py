@@ -119,20 +119,6 @@ def test_actions_out_of_range_are_refused(simulator, action):
         environment.step(action)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"period_s": 0.0}, "period_s"),
-        ({"period_s": float("nan")}, "period_s"),
-        ({"reward": {"speed": 1.0}}, "reward"),
-        ({"scenario": "no_such_scenario"}, "no such file"),
-    ],
-)
-def test_bad_options_are_refused(options, words):
-    with pytest.raises(InputError, match=words):
-        gymnasium.make(NAME, **options)
-
-
 def test_observations_are_within_the_bounds_of_the_scenario(simulator):
     environment = gymnasium.make(NAME, scenario=simulator)
     names = environment.unwrapped.observation_names
@@ -198,8 +184,3 @@ def test_gymnasium_makes_it_by_its_module_without_an_import_before():
     program = f"import gymnasium\nprint(type(gymnasium.make({name!r}).unwrapped).__name__)"
     done = python("-W", "error", "-c", program)
     assert (done.stdout, done.stderr) == ("PipelineInspection\n", "")
-
-
-def test_a_way_to_render_that_it_does_not_have_is_refused():
-    with pytest.raises(InputError, match="render_mode: there is no 'human'"):
-        PipelineInspection(render_mode="human")

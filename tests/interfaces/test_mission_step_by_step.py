@@ -54,24 +54,6 @@ def test_it_stops_at_its_end(simulator):
     assert mission.task is None
 
 
-@pytest.mark.parametrize(
-    ("function", "mode", "words"),
-    [
-        ("f_search", "fd_spiral_high", "there is no function 'f_search'"),
-        (SEARCH, "fd_spiral_hihg", "did you mean 'fd_spiral_high'"),
-        ("generate_recharge_path", "normal", "there is no function 'generate_recharge_path'"),
-    ],
-)
-def test_unknown_names_are_refused_with_what_is_known(simulator, function, mode, words):
-    with pytest.raises(InputError, match=words):
-        Mission(simulator).change_mode(function, mode)
-
-
-def test_modes_are_the_managers_business_if_there_is_one(simulator):
-    with pytest.raises(InputError, match="has a manager"):
-        Mission(simulator, "none").change_mode(SEARCH, "fd_spiral_high")
-
-
 @pytest.mark.parametrize("until", [-1.0, 4.0, float("nan")])
 def test_it_does_not_go_back(simulator, until):
     mission = Mission(simulator)

@@ -47,7 +47,7 @@ class TestOwnModules:
         for name in set(sys.modules) - known:
             del sys.modules[name]
 
-    def test_all_that_a_manager_imports_and_nothing_that_is_installed(self, folder):
+    def test_of_a_manager_what_it_imports_that_is_not_installed(self, folder):
         files = {
             "mine/__init__.py": "",
             "mine/manager.py": "import numpy\nfrom suave_des.managing.simple import NoManager\nfrom . import near\n"

@@ -27,6 +27,8 @@ from suave_des.campaign.missions import Campaign, Finished, MissionKey
 from suave_des.errors import MissionError
 from suave_des.interfaces.client import ClientManager
 from suave_des.interfaces.rosbridge import TOPICS, Bridge
+from suave_des.simulation.simulator import Simulator
+from suave_des.vehicle.model import Pose
 from tests.helpers.command import command_here, wait_until
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"
@@ -231,21 +233,46 @@ def test_all_that_a_long_step_publishes_arrives_before_its_answer():
     assert [each["sec"] * 10 + round(each["nanosec"] / 1e8) for each in clocks] == [*range(551)]
 
 
-def test_the_clock_and_the_pose_are_those_of_the_mission(simulator):
-    mission = Mission(simulator, run=1, seed=8)
-    mission.advance(45.0)
+@pytest.fixture(scope="module")
+def after_45_s() -> tuple[dict, dict]:
+    """The last clock, and the last pose, that are published in a mission's first 45 s."""
     with served() as (_, client):
         client.send("subscribe", topic="/mavros/local_position/pose")
         client.send("subscribe", topic="clock", type="rosgraph_msgs/msg/Clock")
         client.advance(45.05)
         *_, clock = (each for each in client.published if each["topic"] == "clock")
         *_, posed = (each["msg"] for each in client.published if each["topic"] != "clock")
-    assert clock["msg"] == {"clock": {"sec": 45, "nanosec": 0}}
+    return clock["msg"], posed
+
+
+@pytest.fixture(scope="module")
+def pose(simulator: Simulator) -> Pose:
+    """The pose of that mission then."""
+    mission = Mission(simulator, run=1, seed=8)
+    mission.advance(45.0)
+    return mission.pose
+
+
+def test_the_clock_is_that_of_the_mission(after_45_s):
+    clock, _ = after_45_s
+    assert clock == {"clock": {"sec": 45, "nanosec": 0}}
+
+
+def test_the_pose_has_the_mission_time(after_45_s):
+    _, posed = after_45_s
     assert posed["header"] == {"stamp": {"sec": 45, "nanosec": 0}, "frame_id": "map"}
-    position, turned = posed["pose"]["position"], posed["pose"]["orientation"]
-    assert [*position.values()] == pytest.approx(mission.pose[:3], abs=1e-6)
+
+
+def test_the_position_is_that_of_the_mission(after_45_s, pose):
+    _, posed = after_45_s
+    assert [*posed["pose"]["position"].values()] == pytest.approx(pose[:3], abs=1e-6)
+
+
+def test_the_orientation_is_that_of_the_mission(after_45_s, pose):
+    _, posed = after_45_s
+    turned = posed["pose"]["orientation"]
     ahead = Rotation.from_quat([turned[axis] for axis in "xyzw"]).apply([1.0, 0.0, 0.0])
-    _, pitch_rad, yaw_rad = mission.pose[3:]  # first roll, then pitch, then yaw (Fossen, 2.2)
+    _, pitch_rad, yaw_rad = pose[3:]  # first roll, then pitch, then yaw (Fossen, 2.2)
     level = cos(pitch_rad)
     forwards = [cos(yaw_rad) * level, sin(yaw_rad) * level, -sin(pitch_rad)]
     assert ahead == pytest.approx(forwards, abs=1e-9)
@@ -293,11 +320,14 @@ def test_services_answer_as_system_modes(client, simulator):
     assert client.call(f"{SEARCH}/get_mode") == {"current_mode": HIGH, "target_mode": HIGH}
 
 
-def test_a_client_that_offers_the_task_services_is_asked_and_else_the_default_modes_are_set():
-    with served(runs=2) as (_, client):
+def test_where_nobody_offers_the_task_services_the_default_modes_are_set():
+    with served(values=SHORT) as (_, client):
         client.advance(0.1)
         assert client.call(f"/{SEARCH}/get_mode")["target_mode"] == LOW
-        client.advance(1e6)
+
+
+def test_a_client_that_offers_the_task_services_is_asked_instead():
+    with served(values=SHORT) as (_, client):
         client.send("advertise_service", service="/task/request", type="suave_msgs/srv/Task")
         client.send("call_service", service=ADVANCE, args=[0.1])
         asked = client.receive("call_service")
@@ -336,35 +366,41 @@ def test_in_real_time_a_mission_begins_when_a_client_takes_part():
         assert time.monotonic() - began_s >= 10.0 / 20.0
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("{", "not JSON"),
-        ("[" * 50_000, "not JSON"),
-        (b"\xff\xfe", "not JSON"),
-        ("[1]", "unknown operation nothing; known: advertise"),
-        ('{"op": ["subscribe"]}', "unknown operation"),
-        ('{"op": "auth", "mac": "x"}', "unknown operation 'auth'"),
-        ('{"op": "subscribe"}', "topic is nothing"),
-        ('{"op": "subscribe", "topic": "/diagnostic"}', "did you mean '/diagnostics'"),
-        ('{"op": "subscribe", "topic": "/clock", "type": "std_msgs/Bool"}', "is of type rosgraph"),
-        ('{"op": "subscribe", "topic": "/clock", "throttle_rate": NaN}', "throttle_rate is .nan"),
-        ('{"op": "subscribe", "topic": "/clock", "queue_length": -1}', "queue_length is -1"),
-        ('{"op": "subscribe", "topic": "/clock", "compression": "png"}', "no compression"),
-        ('{"op": "publish", "topic": "/clock", "msg": {}}', "is published by the mission"),
-        ('{"op": "advertise", "topic": "/mine"}', "type is nothing"),
-        ('{"op": "advertise_service", "service": "/x", "type": "y"}', "nobody here would call"),
-        ('{"op": "call_service"}', "service is nothing"),
-        (
-            '{"op": "set_level", "level": "errors"}',
-            "there is no level 'errors' (did you mean 'error'",
-        ),
-    ],
+UNUSABLE = (
+    ("{", "not JSON"),
+    ("[" * 50_000, "not JSON"),
+    (b"\xff\xfe", "not JSON"),
+    ("[1]", "unknown operation nothing; known: advertise"),
+    ('{"op": ["subscribe"]}', "unknown operation"),
+    ('{"op": "auth", "mac": "x"}', "unknown operation 'auth'"),
+    ('{"op": "subscribe"}', "topic is nothing"),
+    ('{"op": "subscribe", "topic": "/diagnostic"}', "did you mean '/diagnostics'"),
+    ('{"op": "subscribe", "topic": "/clock", "type": "std_msgs/Bool"}', "is of type rosgraph"),
+    ('{"op": "subscribe", "topic": "/clock", "throttle_rate": NaN}', "throttle_rate is .nan"),
+    ('{"op": "subscribe", "topic": "/clock", "queue_length": -1}', "queue_length is -1"),
+    ('{"op": "subscribe", "topic": "/clock", "compression": "png"}', "no compression"),
+    ('{"op": "publish", "topic": "/clock", "msg": {}}', "is published by the mission"),
+    ('{"op": "advertise", "topic": "/mine"}', "type is nothing"),
+    ('{"op": "advertise_service", "service": "/x", "type": "y"}', "nobody here would call"),
+    ('{"op": "call_service"}', "service is nothing"),
+    (
+        '{"op": "set_level", "level": "errors"}',
+        "there is no level 'errors' (did you mean 'error'",
+    ),
 )
-def test_what_it_cannot_use_gets_a_status_message_and_changes_nothing(client, text, words):
-    before = client.call(f"/{SEARCH}/get_mode")
+"""Messages of a client, with the words that it gets."""
+
+
+@pytest.mark.parametrize(("text", "words"), UNUSABLE)
+def test_what_it_cannot_use_gets_a_status_message(client, text, words):
     assert words in client.refusal(text)
-    assert client.call(f"/{SEARCH}/get_mode") == before
+
+
+def test_what_it_cannot_use_changes_nothing(client):
+    before = client.call(f"/{SEARCH}/get_mode")
+    for text, _ in UNUSABLE:
+        client.refusal(text)
+        assert client.call(f"/{SEARCH}/get_mode") == before
 
 
 @pytest.mark.parametrize(
@@ -426,7 +462,7 @@ def test_a_client_that_reads_nothing_holds_nobody_up():
         assert client.call(f"/{MOTION}/get_mode")
 
 
-def test_a_client_that_asks_and_reads_nothing_is_forgotten_when_it_leaves():
+def test_a_client_that_never_reads_its_answers_is_forgotten_when_it_leaves():
     with served(values=SHORT) as (server, client):
         with other(client, max_queue=1, close_timeout=0.1) as one:
             for topic in ("/clock", "/large"):
@@ -451,12 +487,17 @@ def test_a_mission_goes_on_when_another_server_of_the_process_has_ended():
         assert found["target_mode"] == "fd_follow_pipeline"
 
 
-def test_clients_that_connect_twice_see_the_same_mission_and_each_other(client):
+def test_clients_that_connect_twice_see_the_same_mission(client):
+    with other(client) as one, other(client) as two:
+        assert two.call(f"/{MOTION}/get_mode") == one.call(f"/{MOTION}/get_mode")
+
+
+def test_a_client_gets_what_another_publishes(client):
     with other(client) as one, other(client) as two:
         one.send("advertise", topic="/plan", type="std_msgs/String")
         assert one.call(f"/{MOTION}/get_mode")
         two.send("subscribe", topic="/plan")
-        assert two.call(f"/{MOTION}/get_mode") == one.call(f"/{MOTION}/get_mode")
+        assert two.call(f"/{MOTION}/get_mode")
         one.send("publish", topic="/plan", msg={"data": "higher"})
         message = {"op": "publish", "topic": "/plan", "msg": {"data": "higher"}}
         assert two.receive("publish") == message

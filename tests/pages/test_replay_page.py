@@ -64,20 +64,41 @@ def colours(found, canvas):
     )
 
 
-@pytest.mark.parametrize(("name", "size"), [("one", DESKTOP), ("both", PHONE), ("one", PHONE)])
-def test_it_opens_without_complaint_or_request_and_fits_the_window(name, size, browser, request):
+@pytest.fixture(
+    scope="module",
+    params=[("one", DESKTOP), ("both", PHONE), ("one", PHONE)],
+    ids=["one on a desktop", "two on a phone", "one on a phone"],
+)
+def window(request, browser):
+    """A replay in a window, its file, and the window's width."""
+    name, size = request.param
     file = request.getfixturevalue(name)
     with opened(browser, file, size, f"#t={FAILURE_S}") as found:
-        assert found.complaints == []
-        assert found.outside(file) == []
-        assert found.value("document.documentElement.scrollWidth") <= size[0]
-        for canvas, fewest in (
-            ("canvas.scene", 300),
-            ("canvas.map", 10),
-            ("canvas.profile", 10),
-            ("#timeline", 10),
-        ):
-            assert colours(found, canvas) > fewest, canvas
+        yield found, file, size[0]
+
+
+def test_it_opens_without_complaint(window):
+    found, _, _ = window
+    assert found.complaints == []
+
+
+def test_it_opens_without_request(window):
+    found, file, _ = window
+    assert found.outside(file) == []
+
+
+def test_it_is_not_wider_than_the_window(window):
+    found, _, width = window
+    assert found.value("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize(
+    ("canvas", "fewest"),
+    [("canvas.scene", 300), ("canvas.map", 10), ("canvas.profile", 10), ("#timeline", 10)],
+)
+def test_it_draws(window, canvas, fewest):
+    found, _, _ = window
+    assert colours(found, canvas) > fewest
 
 
 def test_it_opens_within_a_second(one, browser):
@@ -147,7 +168,7 @@ def test_the_legend_names_the_marks_of_the_timeline(opened_one):
     )
 
 
-def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_one):
+def test_the_space_bar_is_the_play_button_wherever_the_focus_is(opened_one):
     scrub_to(opened_one, 0)
     opened_one.value("document.activeElement.blur()")
     opened_one.page.keyboard.press(" ")
@@ -157,15 +178,29 @@ def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_
     assert not opened_one.value("document.body.classList.contains('playing')")
 
 
-def test_the_panel_shows_rule_bindings_and_designs_of_an_adaptation(opened_one):
-    scrub_to(opened_one, int(FAILURE_S))
-    analyze, plan = (opened_one.page.text_content(f".{phase}") for phase in ("analyze", "plan"))
-    assert "IN_ERROR_COMPONENT" in analyze
-    assert "by rule compErrFG" in analyze
-    assert "?c = c_thruster_1" in analyze
-    assert opened_one.page.text_content(".designs .chosen .name") == "fd_recover_thrusters"
-    assert "left out: not realisable" in plan
-    assert opened_one.value("document.querySelectorAll('.lamps .dead').length") == 1
+class TestPanelOfAnAdaptation:
+    @pytest.fixture
+    def panel(self, opened_one):
+        scrub_to(opened_one, int(FAILURE_S))
+        return opened_one.page.text_content
+
+    @pytest.mark.parametrize(
+        ("phase", "words"),
+        [
+            ("analyze", "IN_ERROR_COMPONENT"),
+            ("analyze", "by rule compErrFG"),
+            ("analyze", "?c = c_thruster_1"),
+            ("plan", "left out: not realisable"),
+        ],
+    )
+    def test_shows_what_was_inferred(self, panel, phase, words):
+        assert words in panel(f".{phase}")
+
+    def test_shows_the_design_that_was_chosen(self, panel):
+        assert panel(".designs .chosen .name") == "fd_recover_thrusters"
+
+    def test_shows_which_thruster_has_failed(self, panel, opened_one):
+        assert opened_one.value("document.querySelectorAll('.lamps .dead').length") == 1
 
 
 def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
@@ -185,9 +220,9 @@ IN_SIGHT = """(inner, phase) => {
 }"""
 
 
-@pytest.mark.parametrize(
-    ("name", "size", "is_enlarged"),
-    [
+@pytest.fixture(
+    scope="module",
+    params=[
         ("one", (1024, 768), True),
         ("both", DESKTOP, False),
         ("both", (1920, 1080), False),
@@ -195,15 +230,29 @@ IN_SIGHT = """(inner, phase) => {
         ("both", (1280, 800), True),
         ("both", (1366, 768), True),
     ],
+    ids=str,
 )
-def test_analyze_and_plan_are_in_sight_on_a_projector(name, size, is_enlarged, browser, request):
+def projected(request, browser):
+    """A replay on a projector, of a size, and enlarged or not."""
+    name, size, is_enlarged = request.param
     page = request.getfixturevalue(name)
     with opened(browser, page, size, hash_=f"#t={FAILURE_S + 1.0}") as found:
         if is_enlarged:
             found.page.keyboard.press("b")
-            assert found.value("getComputedStyle(document.body).zoom") == "1.4"
-        assert found.value(f"({IN_SIGHT})('.fact .by', 'analyze')")
-        assert found.value(f"({IN_SIGHT})('.chosen .name', 'plan')")
+        yield found
+
+
+@pytest.mark.parametrize(("phase", "inner"), [("analyze", ".fact .by"), ("plan", ".chosen .name")])
+def test_a_phase_of_the_loop_is_in_sight_on_a_projector(projected, phase, inner):
+    assert projected.value(f"({IN_SIGHT})('{inner}', '{phase}')")
+
+
+def test_a_key_enlarges_all_for_a_projector(opened_one):
+    zoom = "getComputedStyle(document.body).zoom"
+    opened_one.page.keyboard.press("b")
+    enlarged = opened_one.value(zoom)
+    opened_one.page.keyboard.press("b")
+    assert (enlarged, opened_one.value(zoom)) == ("1.4", "1")
 
 
 def test_it_says_when_no_design_is_left(tmp_path, browser):
@@ -233,18 +282,33 @@ def test_names_are_text_never_markup(missions, tmp_path, browser):
         assert found.value("document.querySelectorAll('img, h1 b').length") == 0
 
 
-def test_a_key_hides_all_that_explains_the_mission_and_what_is_to_come(one, browser):
-    explains = ".mind, .legend, #subtitle, .figure:has(.mode)"
-    visible = f"[...document.querySelectorAll('{explains}')].filter(each => each.checkVisibility())"
+EXPLAINS = ".mind, .legend, #subtitle, .figure:has(.mode)"
+EXPLAINING = (
+    f"[...document.querySelectorAll('{EXPLAINS}')].filter(each => each.checkVisibility()).length"
+)
+
+
+@pytest.fixture(scope="module")
+def hidden_for_a_while(one, browser):
+    """Number of what explains the mission, and of colours of the timeline: before a key is pressed,
+    after it, and when it was pressed again.
+    """
+    seen = []
     with opened(browser, one, hash_=f"#t={FAILURE_S}") as found:
-        told, drawn = found.value(f"{visible}.length"), colours(found, "#timeline")
-        assert told == 4
-        found.page.keyboard.press("w")
-        found.wait_until(f"{visible}.length === 0")
-        found.page.wait_for_timeout(100)
-        assert colours(found, "#timeline") < drawn / 2
-        found.page.keyboard.press("w")
-        found.wait_until(f"{visible}.length === 4")
+        for _ in range(3):
+            found.page.wait_for_timeout(200)
+            seen.append((found.value(EXPLAINING), colours(found, "#timeline")))
+            found.page.keyboard.press("w")
+    return seen
+
+
+def test_a_key_hides_all_that_explains_the_mission_for_a_while(hidden_for_a_while):
+    assert [explaining for explaining, _ in hidden_for_a_while] == [4, 0, 4]
+
+
+def test_the_key_hides_what_is_to_come(hidden_for_a_while):
+    (_, before), (_, hidden), _ = hidden_for_a_while
+    assert hidden < before / 2
 
 
 def test_the_key_hides_the_panels_of_two_missions_too(both, browser):

@@ -30,6 +30,13 @@ def opened_report(report, browser):
         yield ready(found)
 
 
+@pytest.fixture(scope="module")
+def on_a_phone(report, browser):
+    """The report on a phone with a dark theme, for those who only look."""
+    with opened(browser, report, PHONE, theme="dark") as found:
+        yield ready(found)
+
+
 def ready(found):
     found.wait_until("document.body.dataset.ready === 'true'")
     return found
@@ -39,23 +46,30 @@ def traces(found, chart):
     return found.value(f"document.getElementById('{chart}').data.map(each => each.name)")
 
 
-def assert_is_drawn_and_fits(found, report, size, theme):
-    assert found.complaints == []
-    assert found.outside(report) == []
-    assert found.value("document.documentElement.scrollWidth") <= size[0]
-    assert found.value("document.documentElement.dataset.theme") == theme
-    for chart in ("ecdf", "spread", "paired", "where", "runs", "run-time", "run-map"):
-        drawn = found.value(f"document.querySelectorAll('#{chart} svg path').length")
-        assert drawn > 3, chart
+@pytest.mark.parametrize("window", ["opened_report", "on_a_phone"])
+class TestWindow:
+    def test_it_opens_without_complaint(self, window, request):
+        assert request.getfixturevalue(window).complaints == []
 
+    def test_it_opens_without_request(self, window, request, report):
+        assert request.getfixturevalue(window).outside(report) == []
 
-class TestItOpensWithoutComplaintOrRequestAndFitsTheWindow:
-    def test_on_a_desktop(self, report, opened_report):
-        assert_is_drawn_and_fits(opened_report, report, DESKTOP, "light")
+    def test_it_is_not_wider(self, window, request):
+        width = {"opened_report": DESKTOP, "on_a_phone": PHONE}[window][0]
+        found = request.getfixturevalue(window)
+        assert found.value("document.documentElement.scrollWidth") <= width
 
-    def test_on_a_phone_with_a_dark_theme(self, report, browser):
-        with opened(browser, report, PHONE, theme="dark") as found:
-            assert_is_drawn_and_fits(ready(found), report, PHONE, "dark")
+    def test_it_has_the_theme_of_the_browser(self, window, request):
+        theme = {"opened_report": "light", "on_a_phone": "dark"}[window]
+        found = request.getfixturevalue(window)
+        assert found.value("document.documentElement.dataset.theme") == theme
+
+    @pytest.mark.parametrize(
+        "chart", ["ecdf", "spread", "paired", "where", "runs", "run-time", "run-map"]
+    )
+    def test_each_chart_is_drawn(self, window, chart, request):
+        paths = f"document.querySelectorAll('#{chart} svg path').length"
+        assert request.getfixturevalue(window).value(paths) > 3
 
 
 OVERLAP = """(() => {
@@ -65,28 +79,42 @@ OVERLAP = """(() => {
 })()"""
 
 
-def test_on_a_phone_the_timeline_s_legend_and_titles_stand_clear_of_each_other(report, browser):
-    with opened(browser, report, PHONE) as found:
-        place = ready(found).value(OVERLAP)
-    assert not place["overlap"]
-    assert place["left"] >= 0
+def test_on_a_phone_the_timeline_s_legend_stands_clear_of_its_title(on_a_phone):
+    assert not on_a_phone.value(OVERLAP)["overlap"]
 
 
-def test_the_timeline_names_its_marks_and_modes_as_a_replay_does(opened_report):
-    told = opened_report.value(
+def test_on_a_phone_the_title_of_the_timeline_s_axis_is_whole(on_a_phone):
+    assert on_a_phone.value(OVERLAP)["left"] >= 0
+
+
+@pytest.fixture
+def legend(opened_report):
+    return opened_report.value(
         "[...document.querySelectorAll('#run-legend span')].map(each => each.textContent)"
     )
-    assert told[0] == "▼adaptation"
-    assert told[told.index("altitude in") - 1] == "┄visibility"
-    assert "━fd_spiral_low" in told and "━fd_follow_pipeline" in told
 
 
-def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
-    page = opened_report.page
-    assert "none" in page.text_content("#conclusion")
-    assert "bt" in page.text_content("#conclusion")
-    assert "SHA-256" in page.text_content("#how")
-    assert page.text_content("#count") == "16 missions"
+def test_the_timeline_names_its_marks_as_a_replay_does(legend):
+    assert legend[0] == "▼adaptation"
+    assert legend[legend.index("altitude in") - 1] == "┄visibility"
+
+
+def test_the_timeline_names_its_modes_as_a_replay_does(legend):
+    assert "━fd_spiral_low" in legend
+    assert "━fd_follow_pipeline" in legend
+
+
+@pytest.mark.parametrize("manager", ["none", "bt"])
+def test_it_says_first_what_follows_for_each_manager(opened_report, manager):
+    assert manager in opened_report.page.text_content("#conclusion")
+
+
+def test_it_says_last_how_it_was_made(opened_report):
+    assert "SHA-256" in opened_report.page.text_content("#how")
+
+
+def test_it_says_of_how_many_missions_it_is(opened_report):
+    assert opened_report.page.text_content("#count") == "16 missions"
 
 
 def test_a_manager_has_the_colour_that_it_has_in_figures(opened_report):
@@ -98,38 +126,69 @@ def test_a_manager_has_the_colour_that_it_has_in_figures(opened_report):
         assert shown == "rgb({}, {}, {})".format(*bytes.fromhex(line(*looks([name]))["color"][1:]))
 
 
-def test_managers_metrics_and_runs_can_be_chosen_and_all_of_them_again(opened_report):
+@pytest.fixture
+def choices(opened_report):
+    """The page of the report, whose choices are afterwards as they were."""
     page = opened_report.page
-    assert traces(opened_report, "ecdf") == ["none", "bt"]
-    metric, among = (page.input_value(f"#{choice}") for choice in ("metric", "found"))
-    page.click("#managers button:first-child")
-    assert traces(opened_report, "ecdf") == ["bt"]
-    assert page.text_content("#count") == "8 missions"
-    page.select_option("#metric", "distance_inspected_m")
-    assert "distance" in page.text_content("#ecdf-title")
-    page.select_option("#found", "0")
-    assert page.text_content("#count") != "8 missions"
-    page.select_option("#found", among)
-    page.select_option("#metric", metric)
-    page.click("#managers button:first-child")
-    assert traces(opened_report, "ecdf") == ["none", "bt"]
-    assert page.text_content("#count") == "16 missions"
+    before = {choice: page.input_value(f"#{choice}") for choice in ("metric", "found")}
+    yield page
+    for choice, value in before.items():
+        if page.input_value(f"#{choice}") != value:
+            page.select_option(f"#{choice}", value)
 
 
-def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign):
+FIRST_MANAGER = "#managers button:first-child"
+
+
+def test_a_manager_can_be_left_out_for_a_while(opened_report):
+    page, seen = opened_report.page, []
+    for _ in range(2):
+        seen.append((traces(opened_report, "ecdf"), page.text_content("#count")))
+        page.click(FIRST_MANAGER)
+    assert seen == [(["none", "bt"], "16 missions"), (["bt"], "8 missions")]
+    assert (traces(opened_report, "ecdf"), page.text_content("#count")) == seen[0]
+
+
+def test_a_metric_can_be_chosen(choices):
+    choices.select_option("#metric", "distance_inspected_m")
+    assert "distance" in choices.text_content("#ecdf-title")
+
+
+def test_runs_can_be_chosen(choices):
+    choices.select_option("#found", "0")
+    assert choices.text_content("#count") != "16 missions"
+
+
+@pytest.fixture(scope="module")
+def clicked(opened_report, campaign):
+    """The report after a click on a mission, and the mission's row."""
     rows = pandas.read_csv(campaign / "runs.csv")
-    row = rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
-    page = opened_report.page
-    page.evaluate(
+    opened_report.page.evaluate(
         "document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})"
     )
-    assert f"{row.search_time_s:g}" in page.text_content("#run-table tr[aria-selected=true]")
-    assert page.input_value("#run-number") == "2"
-    assert "--run 2 --managers bt" in page.text_content("#run-command")
-    drawn = opened_report.value(
-        "document.getElementById('run-time').data.find(each => each.name === 'adaptation').x"
-    )
-    assert len(drawn) == row.adaptations > 0
+    return opened_report, rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
+
+
+class TestClickOnAMission:
+    def test_shows_its_numbers(self, clicked):
+        found, row = clicked
+        selected = found.page.text_content("#run-table tr[aria-selected=true]")
+        assert f"{row.search_time_s:g}" in selected
+
+    def test_chooses_its_run(self, clicked):
+        found, _ = clicked
+        assert found.page.input_value("#run-number") == "2"
+
+    def test_shows_the_command_that_replays_it(self, clicked):
+        found, _ = clicked
+        assert "--run 2 --managers bt" in found.page.text_content("#run-command")
+
+    def test_draws_its_adaptations(self, clicked):
+        found, row = clicked
+        drawn = found.value(
+            "document.getElementById('run-time').data.find(each => each.name === 'adaptation').x"
+        )
+        assert len(drawn) == row.adaptations > 0
 
 
 def test_what_a_manifest_says_is_written_as_text(campaign, tmp_path):
