@@ -48,7 +48,7 @@ def environment(monkeypatch, ci):
     ("driver_starts", "told"),
     [(True, "no Chromium"), (False, "Connection closed while reading from the driver")],
 )
-def test_without_a_browser_tests_of_pages_fail_in_ci_and_are_skipped_elsewhere(
+def test_without_a_browser_tests_of_pages_fail_only_in_ci(
     monkeypatch, tmp_path, environment, outcome, driver_starts, told
 ):
     monkeypatch.setattr("shutil.which", lambda name: None)
@@ -62,9 +62,7 @@ def test_without_a_browser_tests_of_pages_fail_in_ci_and_are_skipped_elsewhere(
 @pytest.mark.parametrize(
     "command", [("no-such-program", "--version"), (sys.executable, "-c", "import no_such_module")]
 )
-def test_without_a_program_its_tests_fail_in_ci_and_are_skipped_elsewhere(
-    monkeypatch, environment, outcome, command
-):
+def test_without_a_program_its_tests_fail_only_in_ci(monkeypatch, environment, outcome, command):
     monkeypatch.setitem(PROGRAMS, "that one", command)
     with pytest.raises(outcome, match="there is no that one"):
         need("that one")
@@ -113,7 +111,7 @@ def test_hooks_before_a_commit_are_what_ci_checks():
     assert {hook["entry"] for hook in local["hooks"]} == in_ci
 
 
-def test_what_is_installed_has_every_module_and_shipped_file():
+def test_every_file_of_the_package_is_installed():
     """A line of .gitignore that fits a package's name would leave the package out."""
     found = {file.relative_path for file in WheelBuilder(str(ROOT)).recurse_included_files()}
     modules = {str(path.relative_to(ROOT)) for path in (ROOT / "suave_des").rglob("*.py")}

@@ -105,7 +105,7 @@ def test_of_what_has_changed_anywhere_it_is_made_anew(known_program, old, new, t
     assert known_program(old, new) == [total, "False"]
 
 
-def test_after_a_change_and_back_again_it_is_found(known_program):
+def test_after_a_change_is_undone_it_is_found(known_program):
     known_program("STEP = 1.0", "STEP = 3.0")
     assert known_program() == ["65.0", "True"]
 

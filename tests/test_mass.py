@@ -87,7 +87,7 @@ def test_statements_that_say_one_thing_are_not(statement):
     assert not any(measure.forms(function(f"def f():\n    {statement}\n")).values())
 
 
-def test_comments_docstrings_and_layout_have_no_mass(tmp_path):
+def test_only_code_has_mass(tmp_path):
     plain, spread = tmp_path / "plain.py", tmp_path / "spread.py"
     plain.write_text("x = f(1, 2)\n", encoding="utf-8")
     spread.write_text('"""A docstring."""\n\n# why\nx = f(\n    1, 2\n)  # so\n', encoding="utf-8")
@@ -98,7 +98,7 @@ def test_comments_docstrings_and_layout_have_no_mass(tmp_path):
     ("name", "text", "tokens"),
     [("a.js", "// why\nlet x = 1;\n", 5), ("a.css", "/* why */\np { margin: 0 }\n", 6)],
 )
-def test_scripts_and_styles_have_mass(tmp_path, name, text, tokens):
+def test_what_a_page_needs_has_mass(tmp_path, name, text, tokens):
     (tmp_path / name).write_text(text, encoding="utf-8")
     assert measure.tokens_of(tmp_path / name) == tokens
 

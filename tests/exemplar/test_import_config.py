@@ -320,9 +320,7 @@ class TestValues:
 
     @pytest.mark.parametrize("revision", REVISIONS)
     @pytest.mark.parametrize("key", ["adapt_period", "adaptation_period"])
-    def test_adapt_period_is_read_from_15_on_and_adaptation_period_before(
-        self, imported, revision, key
-    ):
+    def test_the_adaptation_period_has_its_revisions_key(self, imported, revision, key):
         node = "random_reasoner_node" if revision == "2023" else "task_bridge"
         result = imported(f"{node}: {{ros__parameters: {{{key}: 30}}}}\n", revision=revision)
         is_read = (revision == "1.5") == (key == "adapt_period")
@@ -548,7 +546,7 @@ class TestCampaign:
         assert error.place.startswith(place)
         assert words in str(error)
 
-    def test_shifts_events_first_and_cuts_them_at_the_start_afterwards(self, imported):
+    def test_cuts_events_at_the_start_only_once_they_are_shifted(self, imported):
         runner = RUNNER_15.replace("(1,failure,35)", "(1,failure,-4)")
         drawn = content_of(imported(runner, campaign=True))["perturbations"]
         assert mine().thruster_events[0].time_s == 0
@@ -637,7 +635,7 @@ class TestExperiments:
         )
         assert notes_about(result, words)
 
-    def test_a_second_mission_of_a_manager_is_not_imported_and_nothing_else(self, imported):
+    def test_only_the_second_mission_of_a_manager_is_left_out(self, imported):
         twice = [
             json.dumps({"num_runs": 20, "adaptation_manager": "random", "mission_name": mission})
             for mission in ("suave", "suave_extended")
@@ -846,7 +844,7 @@ class TestCommand:
             (["--out", "mine.yaml"], "FILE"),
         ],
     )
-    def test_bad_input_is_one_line_and_nothing_is_written(self, write, command, arguments, problem):
+    def test_bad_input_is_refused_in_one_line(self, write, command, arguments, problem):
         for name, content in (
             ("mission.yaml", MISSION_15),
             ("runner.yaml", RUNNER_15),

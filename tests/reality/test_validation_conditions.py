@@ -164,9 +164,13 @@ def test_files_of_several_managers_are_one_data_set(write):
     assert [note.split()[0] for note in real.notes] == ["Condition"] * 3
 
 
-def test_missions_without_a_condition_are_taken_in_order_and_that_is_said(write):
+def test_missions_without_a_condition_are_taken_in_order(write):
     real = read_real([write("bt.csv", f"{OWN}\nbt,20,1\nbt,30,1\nbt,40,1\n")], CONDITIONS)
     assert real.frame["condition"].tolist() == [1, 2, 3]
+
+
+def test_that_missions_are_taken_in_order_is_noted(write):
+    real = read_real([write("bt.csv", f"{OWN}\nbt,20,1\nbt,30,1\nbt,40,1\n")], CONDITIONS)
     assert "taken in order" in real.notes[0]
 
 
@@ -392,12 +396,20 @@ def test_no_mission_has_no_share(missions):
     assert row["published_share"] is None
 
 
-def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their_targets():
-    data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
-    published = read_runs(data).frame
-    shares = validated(read_yaml(data.with_suffix(".targets.yaml")), Targets).shares
-    assert {share.manager for share in shares} == {"none", "random", "metacontrol"}
-    with_target = [share for share in shares if share.target is not None]
+PUBLISHED = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+
+
+def shipped_shares() -> tuple[Share, ...]:
+    return validated(read_yaml(PUBLISHED.with_suffix(".targets.yaml")), Targets).shares
+
+
+def test_the_shipped_shares_cover_each_manager():
+    assert {share.manager for share in shipped_shares()} == {"none", "random", "metacontrol"}
+
+
+def test_the_published_runs_meet_the_targets_of_the_shipped_shares():
+    published = read_runs(PUBLISHED).frame
+    with_target = [share for share in shipped_shares() if share.target is not None]
     assert len(with_target) == 4
     for share in with_target:
         low, high = share.target
@@ -482,11 +494,14 @@ class TestIntervalsOverConditions:
         assert ends.tolist() == pytest.approx(expected)
 
 
-def test_a_validation_says_what_is_over_conditions_and_what_is_not(few_resamples):
+def test_a_validation_says_which_of_its_figures_are_over_conditions(few_resamples):
     real = missions("bt", {1: [50.0, 52.0], 2: [90.0, 92.0]})
     text = " ".join(validate(real, real, ["bt"]).remarks("real"))
     assert "are over the conditions (Student's t)" in text
     assert "The tests (KS, AD, Mann-Whitney) and intervals of standard deviations" in text
     assert "take missions as independent" in text
-    alone = real.drop(columns="condition")
+
+
+def test_a_validation_without_conditions_says_nothing_of_them(few_resamples):
+    alone = missions("bt", {1: [50.0, 52.0], 2: [90.0, 92.0]}).drop(columns="condition")
     assert "independent" not in " ".join(validate(alone, alone, ["bt"]).remarks("real"))

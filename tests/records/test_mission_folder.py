@@ -93,7 +93,7 @@ def test_the_altitudes_of_search_modes_are_read_as_they_were(folder, loaded):
     assert read_mission(folder).search_altitudes_m == loaded.modes.search_altitudes_m
 
 
-def test_inputs_are_those_of_the_scenario_and_further_ones(folder, loaded):
+def test_further_inputs_join_those_of_the_scenario(folder, loaded):
     assert read_mission(folder).inputs == {**loaded.inputs, "own.py": "abc"}
 
 
@@ -144,7 +144,7 @@ def test_an_empty_cell_is_a_missing_value(folder):
 
 
 @pytest.mark.parametrize("column", ["t_s", "x_m", "y_m", "z_m"])
-def test_but_each_point_has_a_time_and_a_place(folder, column):
+def test_but_no_point_lacks_a_coordinate(folder, column):
     replaced(folder / TRAJECTORY_FILE, 3, column, "")
     with pytest.raises(InputError, match=f"line 3: {column}: expected a finite number, got ''"):
         read_mission(folder)

@@ -87,7 +87,7 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         (f'{OWN}\n"none,120,3\n', 2, "is not valid CSV"),
     ],
 )
-def test_a_wrong_file_is_named_with_its_line_and_what_would_be_right(write, content, line, problem):
+def test_a_wrong_file_is_refused(write, content, line, problem):
     path = write("runs.csv", content)
     with pytest.raises(InputError) as caught:
         read_runs(path)

@@ -177,7 +177,7 @@ def test_an_outcome_that_was_changed_is_damage(closed, statement, problem):
         kept(opened)
 
 
-def test_what_was_noted_and_then_changed_is_damage(closed):
+def test_a_note_that_was_changed_since_is_damage(closed):
     changed(closed, "UPDATE about SET value = '\"two\"'")
     with (
         closing(Store(closed / STORE_FILE)) as opened,
@@ -278,7 +278,7 @@ def test_files_that_are_written_again_take_the_place_of_the_earlier_ones(tmp_pat
     assert (tmp_path / RUNS_FILE).read_text() == "b"
 
 
-def test_the_manifest_has_what_is_known_of_the_campaign_and_the_hash_of_each_file(tmp_path):
+def test_the_manifest_adds_the_hash_of_each_file_to_what_is_known(tmp_path):
     written(tmp_path, {"seed": 1}, {RUNS_FILE: "abc"}, {"none_suave.csv": ""})
     assert json.loads((tmp_path / MANIFEST_FILE).read_text()) == {
         "seed": 1,

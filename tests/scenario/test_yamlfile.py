@@ -154,7 +154,7 @@ PLAIN = st.recursive(
     data=st.dictionaries(st.text("abcxyz_", min_size=1), PLAIN, min_size=1, max_size=5),
     indent=st.sampled_from([None, 0, 2]),
 )
-def test_plain_data_survives_being_written_as_json_and_read(tmp_path_factory, data, indent):
+def test_json_of_plain_data_is_read_as_it_was(tmp_path_factory, data, indent):
     path = tmp_path_factory.mktemp("yaml") / "a.yaml"
     path.write_text(json.dumps(data, indent=indent), encoding="utf-8")
     assert read_yaml(path).data == data

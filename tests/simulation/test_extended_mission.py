@@ -108,7 +108,7 @@ def test_after_the_recharge_the_tree_draws_the_vehicle_back_no_more():
     assert x_m[-1] < x_m[0] - 5.0
 
 
-def test_the_level_is_the_knowledge_bases_and_not_the_codes():
+def test_the_level_is_the_knowledge_bases():
     loaded = load_scenario("extended")
     half = with_values(loaded, {"knowledge.values": {"qa_battery_level_work": 0.5}})
     result = Simulator(half).run("metacontrol", run=3, seed=1, record=True)

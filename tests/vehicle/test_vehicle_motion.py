@@ -188,7 +188,7 @@ FULL_THRUST = Autopilot(10.0, 100.0, 100.0, 0.15)
         ((0.0, 0.0, -1e4), 2, -1.1675),  # sqrt(99.802 / 73.225)
     ],
 )
-def test_its_greatest_speeds_follow_from_thrust_and_drag(way, component, speed_m_per_s):
+def test_its_greatest_speeds_are_where_drag_balances_thrust(way, component, speed_m_per_s):
     vehicle = Vehicle(BLUEROV2, FULL_THRUST, Pose(*PLACE_M, 0.0, 0.0, 0.0), 60.0)
     vehicle.command(0.0, *way)
     assert nu(vehicle, 50.0)[component] == pytest.approx(speed_m_per_s, rel=0.003)
@@ -203,9 +203,7 @@ def test_its_greatest_speeds_follow_from_thrust_and_drag(way, component, speed_m
     ],
     ids=["surge", "sway", "yaw"],
 )
-def test_without_thrust_it_slows_down_as_mass_inertia_and_drag_say(
-    make_vehicle, component, after_s, speed
-):
+def test_without_thrust_it_slows_down_by_drag(make_vehicle, component, after_s, speed):
     vehicle = make_vehicle(lost=ALL)
     # v' = -(c / m) v |v| gives v = 1 / (1 + c t / m).
     set_nu(vehicle, [float(place == component) for place in range(6)])
