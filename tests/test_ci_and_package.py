@@ -68,9 +68,12 @@ def test_without_a_program_its_tests_fail_only_in_ci(monkeypatch, environment, o
         need("that one")
 
 
-def test_ci_says_that_it_is_and_runs_the_slow_tests():
+def test_ci_says_that_it_is():
+    assert "\nexport CI=true" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_ci_runs_the_slow_tests():
     text = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    assert "\nexport CI=true" in text
     assert re.search(r"^timeout \d+ .venv/bin/pytest -m slow", text, flags=re.MULTILINE)
 
 
@@ -80,19 +83,26 @@ def test_versions_are_tried_on_rooms_that_exist():
     assert all((ROOT / room).is_dir() for room in rooms)
 
 
-def test_readme_classifiers_and_ci_name_the_same_pythons():
+def minors_declared() -> list[int]:
+    """Python 3's minor versions of the project's classifiers."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = [
+    return [
         int(each.rpartition(".")[2])
         for each in project["classifiers"]
         if each.startswith("Programming Language :: Python :: 3.")
     ]
+
+
+def test_the_readme_names_the_pythons_of_the_classifiers():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     lowest, highest = re.search(r"Python 3\.(\d+) to 3\.(\d+)", readme).groups()
-    assert declared == list(range(int(lowest), int(highest) + 1))
+    assert minors_declared() == list(range(int(lowest), int(highest) + 1))
+
+
+def test_ci_tries_the_pythons_of_the_classifiers():
     versions = (ROOT / ".ci" / "versions").read_text(encoding="utf-8")
     tried = re.search(r"^for python in (.*); do$", versions, flags=re.MULTILINE)[1].split()
-    assert tried == [f"python3.{minor}" for minor in declared]
+    assert tried == [f"python3.{minor}" for minor in minors_declared()]
 
 
 def test_hooks_before_a_commit_are_what_ci_checks():

@@ -337,12 +337,20 @@ class TestCommand:
         x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
         assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type
 
-    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, command):
+    def test_replaces_nothing_unasked(self, write, command):
         write("there/mission_config.yaml", "kept")
-        export = ("export-config", "release15", "--out")
-        status, _, error = command(*export, "there")
+        status, _, error = command("export-config", "release15", "--out", "there")
         assert status == 2 and "exists already" in error
         assert Path("there/mission_config.yaml").read_text() == "kept"
-        status, out, _ = command(*export, "there", "--overwrite")
+
+    def test_replaces_files_if_asked_to(self, write, command):
+        write("there/mission_config.yaml", "replaced")
+        assert command("export-config", "release15", "--out", "there", "--overwrite").status == 0
+        assert Path("there/mission_config.yaml").read_text() != "replaced"
+
+    def test_tells_what_is_lost(self, write, command):
+        status, out, _ = command("export-config", "release15", "--out", ".")
         assert status == 0 and out.startswith("not exported: battery: nothing here")
-        assert command(*export, "no/where").status == 2
+
+    def test_makes_one_folder_at_most(self, write, command):
+        assert command("export-config", "release15", "--out", "no/where").status == 2

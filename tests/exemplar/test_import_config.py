@@ -112,6 +112,10 @@ def content_of(result) -> dict:
     return yaml.safe_load(result.campaign)
 
 
+SAME_EVENTS = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"
+"""Those of MISSION_2023, written otherwise."""
+
+
 def refused(imported, *contents, **options) -> InputError:
     with pytest.raises(InputError) as caught:
         imported(*contents, **options)
@@ -781,45 +785,54 @@ class TestBadInput:
         problem = f"describes several experiments, for the exemplar's {program}"
         assert refused(imported, text).problem == problem
 
-    def test_two_files_may_say_the_same_and_must_not_contradict(self, imported):
-        same = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"
-        imported(
-            MISSION_2023, same, "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n"
-        )
-        for other in (
+    def test_two_files_may_say_the_same(self, imported):
+        limit = "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n"
+        imported(MISSION_2023, SAME_EVENTS, limit)
+
+    @pytest.mark.parametrize(
+        "other",
+        [
             "parent_mission_node: {ros__parameters: {time_limit: 300}}\n",
-            same.replace("35", "36"),
-        ):
-            error = refused(imported, MISSION_2023, other)
-            assert error.file == "given1.yaml"
-            assert "contradicts given0.yaml: line" in error.problem
+            SAME_EVENTS.replace("35", "36"),
+        ],
+        ids=["another limit", "another event"],
+    )
+    def test_a_file_must_not_contradict_another(self, imported, other):
+        error = refused(imported, MISSION_2023, other)
+        assert error.file == "given1.yaml"
+        assert "contradicts given0.yaml: line" in error.problem
 
 
 class TestCommand:
-    def test_writes_scenario_and_campaign_and_tells_the_rest(self, write, command):
+    @pytest.fixture
+    def told(self, write, command) -> list[str]:
+        """Lines of an import of two files into two others."""
         write("mission.yaml", MISSION_15)
         write("runner.yaml", RUNNER_15)
         write("sub/keep.txt", "")
-        arguments = [
-            "mission.yaml",
-            "runner.yaml",
-            "--out",
-            "mine.yaml",
-            "--campaign",
-            "sub/campaign.yaml",
-        ]
-        status, out, _ = command("import-config", *arguments)
-        told = out.splitlines()
+        options = ("--out", "mine.yaml", "--campaign", "sub/campaign.yaml")
+        status, out, _ = command("import-config", "mission.yaml", "runner.yaml", *options)
         assert status == 0
+        return out.splitlines()
+
+    @pytest.mark.usefixtures("told")
+    def test_writes_a_scenario(self):
+        assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
+
+    @pytest.mark.usefixtures("told")
+    def test_writes_a_campaign_of_that_scenario(self):
+        assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
+
+    def test_tells_what_is_written(self, told):
         assert told[-2].startswith(
             "mine.yaml is written, based on release15: only revision 1.5 has "
         )
         assert told[-1] == "sub/campaign.yaml is written"
+
+    def test_tells_what_is_not_needed_here(self, told):
         assert any(
             "not needed here" in line and "mission_metrics.result_path" in line for line in told
         )
-        assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
-        assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
 
     @pytest.mark.parametrize(
         ("arguments", "problem"),

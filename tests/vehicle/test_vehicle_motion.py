@@ -52,10 +52,18 @@ def test_one_lost_horizontal_thruster_barely_slows_it(make_vehicle, lost, direct
     assert healthy_s <= time_to_go_s(make_vehicle(lost=(lost,)), direction_deg) < 1.3 * healthy_s
 
 
-@pytest.mark.parametrize("lost", [(1, 3), (2, 4)], ids=["right side", "left side"])
-def test_two_lost_on_one_side_slow_it_ahead_and_turn_it(make_vehicle, lost):
+ON_ONE_SIDE = pytest.mark.parametrize("lost", [(1, 3), (2, 4)], ids=["right side", "left side"])
+
+
+@ON_ONE_SIDE
+def test_two_lost_on_one_side_slow_it_ahead(make_vehicle, lost):
+    assert time_to_go_s(make_vehicle(lost=lost), 0) > 1.2 * time_to_go_s(make_vehicle(), 0)
+
+
+@ON_ONE_SIDE
+def test_two_lost_on_one_side_turn_it(make_vehicle, lost):
     vehicle = make_vehicle(lost=lost)
-    assert time_to_go_s(vehicle, 0) > 1.2 * time_to_go_s(make_vehicle(), 0)
+    time_to_go_s(vehicle, 0)
     assert max(abs(vehicle.pose(0.1 * n).yaw_rad) for n in range(100)) > 0.2
 
 
