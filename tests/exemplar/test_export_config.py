@@ -101,10 +101,7 @@ def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
     return with_values(BLANK[revision], values), campaign
 
 
-@pytest.mark.parametrize("revision", REVISIONS)
-@given(data=st.data())
-@settings(max_examples=25, deadline=None)
-def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data):
+def assert_imports_again(revision: str, data: st.DataObject) -> None:
     loaded, campaign = data.draw(expressible(revision))
     texts, lost = export_config(loaded, campaign, revision)
     assert lost == ()
@@ -126,6 +123,17 @@ def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data)
         assert drawn.keys() == perturbed.keys()
         for path, distribution in perturbed.items():
             assert drawn[path] == pytest.approx(distribution, abs=1e-6)
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+@pytest.mark.parametrize("examples", [8, pytest.param(50, marks=pytest.mark.slow)])
+def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, examples):
+    @settings(max_examples=examples, deadline=None)
+    @given(st.data())
+    def check(data: st.DataObject) -> None:
+        assert_imports_again(revision, data)
+
+    check()
 
 
 def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **campaign) -> str:

@@ -218,11 +218,16 @@ def test_time_before_the_first_measurement_does_not_count(mission):
     assert mission(text).further["requirement_see"] == pytest.approx(1.0)
 
 
+REASONING = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
+
+
 def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission):
-    text = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
-    assert mission(text, "metacontrol").further["reasoning_time_s"] % 0.5 == 0.0
-    assert mission(text, "metacontrol").further["reasoning_time_s"] > 0.0
-    assert mission(text, "none").further["reasoning_time_s"] == 0.0
+    taken_s = mission(REASONING, "metacontrol").further["reasoning_time_s"]
+    assert taken_s % 0.5 == 0.0 < taken_s
+
+
+def test_who_does_not_reason_takes_no_time_for_it(mission):
+    assert mission(REASONING, "none").further["reasoning_time_s"] == 0.0
 
 
 def test_all_of_them_leave_the_mission_as_it_is(mission):
