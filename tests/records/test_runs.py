@@ -8,7 +8,6 @@ import pandas
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.records.metrics import METRICS, metric_of
 from suave_des.records.runs import Runs, read_runs
 
 OWN = "manager,search_time_s,distance_inspected_m"
@@ -190,8 +189,3 @@ def test_as_a_metric_it_is_refused_with_its_line(write, number):
     with pytest.raises(InputError) as caught:
         read_runs(write("runs.csv", f"{OWN},adaptations\nnone,120,3,{number}\n"))
     assert caught.value.place == "line 2"
-
-
-def test_a_metric_of_which_one_direction_is_better_has_the_words_to_say_so():
-    metrics = [*METRICS.values(), metric_of("requirement_depth")]
-    assert all(each.less and each.more and each.most for each in metrics if each.better)
