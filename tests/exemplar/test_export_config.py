@@ -318,6 +318,13 @@ class TestWhatTheExemplarCannotExpress:
             export_config(BLANK["1.5"], {}, "1.6")
 
 
+@pytest.mark.parametrize("manager", ["bt", "bt_extended"])
+def test_the_tree_of_the_extended_mission_has_a_program_of_its_own(manager):
+    campaign = {"managers": [manager], "runs": 1, "seed": 1}
+    runner = export_config(BLANK["1.5"], campaign)[0][RUNNER_FILE]
+    assert ("bt_executable:=suave_bt_extended" in runner) == (manager == "bt_extended")
+
+
 class TestCommand:
     def test_writes_files_that_import_config_reads(self, write, command):
         write("mine.yaml", "base: release15\nbattery: {}\nmission: {time_limit_s: 240}\n")

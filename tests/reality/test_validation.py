@@ -195,18 +195,29 @@ def test_another_seed_resamples_otherwise(published, like_published, of_none_alo
     assert ends(other.cells.loc[0], "std_ratio") != ends(of_none_alone.cells.loc[0], "std_ratio")
 
 
-def test_what_few_missions_cannot_show_is_not_judged(published):
+@pytest.fixture(scope="module")
+def of_few(published, few_resamples):
+    """A validation with one simulated mission of each manager."""
     few = published.groupby("manager").head(1)
     shares = [
         Share(manager="none", name="of none", of="detections", among={"search_time_s": [(0, 1)]},
               where={"detection_x_m": [(-19, -18)]}, target=(0, 1))
     ]  # fmt: skip
-    found = validate(published, few, MANAGERS, shares=shares)
-    judged = found.targets.set_index("kind")["met"].to_dict()
-    assert judged["std"] is None
-    assert judged["conclusion"] is None
-    assert judged["share"] is None
-    assert not found.all_met
+    return validate(published, few, MANAGERS, shares=shares)
+
+
+@pytest.mark.parametrize("kind", ["std", "conclusion", "share"])
+def test_what_few_missions_cannot_show_is_not_judged(of_few, kind):
+    assert of_few.targets.set_index("kind")["met"].to_dict()[kind] is None
+
+
+def test_what_is_not_judged_is_not_met(of_few):
+    assert not of_few.all_met
+
+
+def test_what_is_not_judged_is_counted_apart(of_few):
+    summary = json.loads(of_few.texts({})[JSON_FILE])["targets_summary"]
+    assert summary["not_judged"] == of_few.targets["met"].isna().sum()
 
 
 @pytest.mark.parametrize(
