@@ -32,7 +32,7 @@ def test_what_was_added_is_read(filled):
     assert not list(SharedEntries(filled.parent, "e").read())
 
 
-def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled):
+def test_only_damaged_entries_are_left_out(filled):
     content = (
         filled.read_bytes().replace(b"IN_ERROR_3", b"IN_ERROR_4")
         + b"\xff\x00 trash [\n"

@@ -48,7 +48,7 @@ def environment(monkeypatch, ci):
     ("driver_starts", "told"),
     [(True, "no Chromium"), (False, "Connection closed while reading from the driver")],
 )
-def test_without_a_browser_tests_of_pages_fail_in_ci_and_are_skipped_elsewhere(
+def test_without_a_browser_tests_of_pages_fail_only_in_ci(
     monkeypatch, tmp_path, environment, outcome, driver_starts, told
 ):
     monkeypatch.setattr("shutil.which", lambda name: None)
@@ -62,17 +62,18 @@ def test_without_a_browser_tests_of_pages_fail_in_ci_and_are_skipped_elsewhere(
 @pytest.mark.parametrize(
     "command", [("no-such-program", "--version"), (sys.executable, "-c", "import no_such_module")]
 )
-def test_without_a_program_its_tests_fail_in_ci_and_are_skipped_elsewhere(
-    monkeypatch, environment, outcome, command
-):
+def test_without_a_program_its_tests_fail_only_in_ci(monkeypatch, environment, outcome, command):
     monkeypatch.setitem(PROGRAMS, "that one", command)
     with pytest.raises(outcome, match="there is no that one"):
         need("that one")
 
 
-def test_ci_says_that_it_is_and_runs_the_slow_tests():
+def test_ci_says_that_it_is():
+    assert "\nexport CI=true" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_ci_runs_the_slow_tests():
     text = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    assert "\nexport CI=true" in text
     assert re.search(r"^timeout \d+ .venv/bin/pytest -m slow", text, flags=re.MULTILINE)
 
 
@@ -82,19 +83,26 @@ def test_versions_are_tried_on_rooms_that_exist():
     assert all((ROOT / room).is_dir() for room in rooms)
 
 
-def test_readme_classifiers_and_ci_name_the_same_pythons():
+def minors_declared() -> list[int]:
+    """Python 3's minor versions of the project's classifiers."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = [
+    return [
         int(each.rpartition(".")[2])
         for each in project["classifiers"]
         if each.startswith("Programming Language :: Python :: 3.")
     ]
+
+
+def test_the_readme_names_the_pythons_of_the_classifiers():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     lowest, highest = re.search(r"Python 3\.(\d+) to 3\.(\d+)", readme).groups()
-    assert declared == list(range(int(lowest), int(highest) + 1))
+    assert minors_declared() == list(range(int(lowest), int(highest) + 1))
+
+
+def test_ci_tries_the_pythons_of_the_classifiers():
     versions = (ROOT / ".ci" / "versions").read_text(encoding="utf-8")
     tried = re.search(r"^for python in (.*); do$", versions, flags=re.MULTILINE)[1].split()
-    assert tried == [f"python3.{minor}" for minor in declared]
+    assert tried == [f"python3.{minor}" for minor in minors_declared()]
 
 
 def test_hooks_before_a_commit_are_what_ci_checks():
@@ -113,7 +121,7 @@ def test_hooks_before_a_commit_are_what_ci_checks():
     assert {hook["entry"] for hook in local["hooks"]} == in_ci
 
 
-def test_what_is_installed_has_every_module_and_shipped_file():
+def test_every_file_of_the_package_is_installed():
     """A line of .gitignore that fits a package's name would leave the package out."""
     found = {file.relative_path for file in WheelBuilder(str(ROOT)).recurse_included_files()}
     modules = {str(path.relative_to(ROOT)) for path in (ROOT / "suave_des").rglob("*.py")}

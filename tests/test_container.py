@@ -20,7 +20,7 @@ def done(*command: str) -> str:
     return result.stdout.strip()
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def builder() -> str:
     """A program that builds containers, which has the base image."""
     name = next(filter(shutil.which, ("buildah", "podman")), None)
@@ -35,7 +35,7 @@ def builder() -> str:
     return name
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def container(builder: str):
     """The command that runs what follows in the container."""
     done(builder, "build", "-t", IMAGE, ".")
@@ -49,9 +49,13 @@ def container(builder: str):
 
 
 @pytest.mark.slow
-def test_the_container_is_built_and_flies_a_mission(container):
+def test_the_container_has_this_version(container):
     from suave_des import __version__
 
     assert done(*container, "suave-des", "--version") == f"suave-des {__version__}"
+
+
+@pytest.mark.slow
+def test_the_container_flies_a_mission(container):
     mission = done(*container, "suave-des", "run", "seams2023", "--set", "mission.time_limit_s=30")
     assert "mission" in mission

@@ -85,7 +85,7 @@ def test_java_starts_without_numpy_which_can_be_used_with_it():
     assert python("-c", REASONING).stdout.splitlines() == ["False", "[0. 1. 2.]"]
 
 
-def test_what_is_hidden_cannot_be_imported_meanwhile_and_can_afterwards():
+def test_what_is_hidden_cannot_be_imported():
     sys.modules.pop("this", None)
     with pytest.raises(ImportError), hidden("this"):
         __import__("this")

@@ -2,6 +2,8 @@
 would obey.
 """
 
+import pytest
+
 from suave_des.tables import Table, broken_name
 
 TABLE = Table(
@@ -14,7 +16,7 @@ TABLE = Table(
 )
 
 
-def test_text_has_names_to_the_left_and_numbers_to_the_right():
+def test_text_is_aligned():
     assert TABLE.text().split("\n") == [
         "manager                   n    mean    95% interval",
         "none                     20  187.85  168.0 to 207.7",
@@ -22,14 +24,17 @@ def test_text_has_names_to_the_left_and_numbers_to_the_right():
     ]
 
 
-def test_a_text_that_is_too_wide_breaks_names_and_never_numbers():
+def test_a_text_that_is_too_wide_breaks_names_alone():
     assert TABLE.text(45).split("\n") == [
         "manager            n    mean    95% interval",
         "none              20  187.85  168.0 to 207.7",
         "own:Metacontrol_   5   -1.50    -3e-5 to 1.2",
         "  of_mine",
     ]
-    assert TABLE.text(10) == TABLE.text(40)  # as narrow as it gets
+
+
+def test_a_text_gets_no_narrower_than_its_numbers():
+    assert TABLE.text(10) == TABLE.text(40)
 
 
 def test_a_row_of_one_cell_is_a_heading_of_those_below():
@@ -47,7 +52,7 @@ def test_markdown_shows_names_as_they_are():
     )
 
 
-def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing():
+def test_latex_is_written_as_it_is_printed():
     table = Table(
         ("Manager", "Mean", "Std", "Mean", "Std"),
         [("a_b & c", "1", "-2", "3e-05", "-1.0 to -0.5")],
@@ -71,30 +76,44 @@ def test_latex_has_headings_over_columns_and_numbers_in_its_own_writing():
     ]
 
 
-def test_csv_and_a_notebook_have_the_same_cells():
-    table = Table(("name", "n"), [('<i>"a", b</i>', "1")], "t & u")
-    assert table.csv() == 'name,n\n"<i>""a"", b</i>",1\n'
-    assert table._repr_markdown_().startswith("t & u\n\n| name | n |\n")
-    assert '| &lt;i&gt;"a", b&lt;/i&gt; | 1 |' in table._repr_markdown_()
+OF_MARKUP = Table(("name", "n"), [('<i>"a", b</i>', "1")], "t & u")
 
 
-def test_names_break_after_separators_and_before_capitals_and_numbers_keep_their_sign():
+def test_csv_has_cells_as_they_are():
+    assert OF_MARKUP.csv() == 'name,n\n"<i>""a"", b</i>",1\n'
+
+
+def test_a_notebook_shows_the_title_above_the_header():
+    assert OF_MARKUP._repr_markdown_().startswith("t & u\n\n| name | n |\n")
+
+
+def test_a_notebook_shows_markup_as_text():
+    assert '| &lt;i&gt;"a", b&lt;/i&gt; | 1 |' in OF_MARKUP._repr_markdown_()
+
+
+def test_names_break_where_words_end():
     assert broken_name("tests.helpers.own:MyManager", 14) == "tests.helpers.\n  own:My\n  Manager"
     assert broken_name("metacontrol (n = 20)", 14) == "metacontrol\n  (n = 20)"
     assert broken_name("first\n_second", 7) == "first\n_second"
 
 
-def test_latex_has_a_minus_before_each_negative_number_and_units_outside_of_formulas():
+def test_latex_has_a_minus_before_each_negative_number():
     cells = ("-0.82 (-0.90 to -0.70)", "-3.3 points", "", "-1e-05")
     table = Table(("a", "b", "c", "d", "e"), [("x-1 \N{MINUS SIGN} y", *cells)])
     row = r"x-1 $-$ y & $-0.82$ ($-0.90$ to $-0.70$) & $-3.3$ points & & $-1 \cdot 10^{-5}$ \\"
     assert row in table.latex()
 
 
-def test_a_wide_table_is_in_small_print_in_latex_and_a_wider_one_breaks_its_names():
-    def latex(name_length: int) -> str:
-        return Table(("a", "b"), [("n" * name_length, "1234")]).latex()
-
-    assert "footnotesize" not in latex(50)
-    assert r"\footnotesize" in latex(66) and r"\begin{tabular}{lr}" in latex(66)
-    assert r"{>{\raggedright\arraybackslash}p{0.31\linewidth}r}" in latex(80)
+@pytest.mark.parametrize(
+    ("name_length", "is_small", "columns"),
+    [
+        (50, False, "{lr}"),
+        (66, True, "{lr}"),
+        (80, True, r"{>{\raggedright\arraybackslash}p{0.31\linewidth}r}"),
+    ],
+    ids=["as it is", "in small print", "with names that break"],
+)
+def test_a_table_fits_the_page_in_latex(name_length, is_small, columns):
+    latex = Table(("a", "b"), [("n" * name_length, "1234")]).latex()
+    assert (r"\footnotesize" in latex) == is_small
+    assert columns in latex

@@ -101,10 +101,7 @@ def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
     return with_values(BLANK[revision], values), campaign
 
 
-@pytest.mark.parametrize("revision", REVISIONS)
-@given(data=st.data())
-@settings(max_examples=25, deadline=None)
-def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data):
+def assert_imports_again(revision: str, data: st.DataObject) -> None:
     loaded, campaign = data.draw(expressible(revision))
     texts, lost = export_config(loaded, campaign, revision)
     assert lost == ()
@@ -126,6 +123,17 @@ def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, data)
         assert drawn.keys() == perturbed.keys()
         for path, distribution in perturbed.items():
             assert drawn[path] == pytest.approx(distribution, abs=1e-6)
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+@pytest.mark.parametrize("examples", [8, pytest.param(50, marks=pytest.mark.slow)])
+def test_what_the_exemplar_can_express_imports_again_to_the_same(revision, examples):
+    @settings(max_examples=examples, deadline=None)
+    @given(st.data())
+    def check(data: st.DataObject) -> None:
+        assert_imports_again(revision, data)
+
+    check()
 
 
 def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **campaign) -> str:
@@ -310,6 +318,13 @@ class TestWhatTheExemplarCannotExpress:
             export_config(BLANK["1.5"], {}, "1.6")
 
 
+@pytest.mark.parametrize("manager", ["bt", "bt_extended"])
+def test_the_tree_of_the_extended_mission_has_a_program_of_its_own(manager):
+    campaign = {"managers": [manager], "runs": 1, "seed": 1}
+    runner = export_config(BLANK["1.5"], campaign)[0][RUNNER_FILE]
+    assert ("bt_executable:=suave_bt_extended" in runner) == (manager == "bt_extended")
+
+
 class TestCommand:
     def test_writes_files_that_import_config_reads(self, write, command):
         write("mine.yaml", "base: release15\nbattery: {}\nmission: {time_limit_s: 240}\n")
@@ -337,12 +352,20 @@ class TestCommand:
         x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
         assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type
 
-    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, command):
+    def test_replaces_nothing_unasked(self, write, command):
         write("there/mission_config.yaml", "kept")
-        export = ("export-config", "release15", "--out")
-        status, _, error = command(*export, "there")
+        status, _, error = command("export-config", "release15", "--out", "there")
         assert status == 2 and "exists already" in error
         assert Path("there/mission_config.yaml").read_text() == "kept"
-        status, out, _ = command(*export, "there", "--overwrite")
+
+    def test_replaces_files_if_asked_to(self, write, command):
+        write("there/mission_config.yaml", "replaced")
+        assert command("export-config", "release15", "--out", "there", "--overwrite").status == 0
+        assert Path("there/mission_config.yaml").read_text() != "replaced"
+
+    def test_tells_what_is_lost(self, write, command):
+        status, out, _ = command("export-config", "release15", "--out", ".")
         assert status == 0 and out.startswith("not exported: battery: nothing here")
-        assert command(*export, "no/where").status == 2
+
+    def test_makes_one_folder_at_most(self, write, command):
+        assert command("export-config", "release15", "--out", "no/where").status == 2

@@ -112,6 +112,10 @@ def content_of(result) -> dict:
     return yaml.safe_load(result.campaign)
 
 
+SAME_EVENTS = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"
+"""Those of MISSION_2023, written otherwise."""
+
+
 def refused(imported, *contents, **options) -> InputError:
     with pytest.raises(InputError) as caught:
         imported(*contents, **options)
@@ -320,9 +324,7 @@ class TestValues:
 
     @pytest.mark.parametrize("revision", REVISIONS)
     @pytest.mark.parametrize("key", ["adapt_period", "adaptation_period"])
-    def test_adapt_period_is_read_from_15_on_and_adaptation_period_before(
-        self, imported, revision, key
-    ):
+    def test_the_adaptation_period_has_its_revisions_key(self, imported, revision, key):
         node = "random_reasoner_node" if revision == "2023" else "task_bridge"
         result = imported(f"{node}: {{ros__parameters: {{{key}: 30}}}}\n", revision=revision)
         is_read = (revision == "1.5") == (key == "adapt_period")
@@ -548,7 +550,7 @@ class TestCampaign:
         assert error.place.startswith(place)
         assert words in str(error)
 
-    def test_shifts_events_first_and_cuts_them_at_the_start_afterwards(self, imported):
+    def test_cuts_events_at_the_start_only_once_they_are_shifted(self, imported):
         runner = RUNNER_15.replace("(1,failure,35)", "(1,failure,-4)")
         drawn = content_of(imported(runner, campaign=True))["perturbations"]
         assert mine().thruster_events[0].time_s == 0
@@ -637,7 +639,7 @@ class TestExperiments:
         )
         assert notes_about(result, words)
 
-    def test_a_second_mission_of_a_manager_is_not_imported_and_nothing_else(self, imported):
+    def test_only_the_second_mission_of_a_manager_is_left_out(self, imported):
         twice = [
             json.dumps({"num_runs": 20, "adaptation_manager": "random", "mission_name": mission})
             for mission in ("suave", "suave_extended")
@@ -783,45 +785,54 @@ class TestBadInput:
         problem = f"describes several experiments, for the exemplar's {program}"
         assert refused(imported, text).problem == problem
 
-    def test_two_files_may_say_the_same_and_must_not_contradict(self, imported):
-        same = "thruster_monitor: {ros__parameters: {thruster_events: ['(1, failure, 35)', '(3,recovery,50.0)']}}\n"
-        imported(
-            MISSION_2023, same, "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n"
-        )
-        for other in (
+    def test_two_files_may_say_the_same(self, imported):
+        limit = "parent_mission_node: {ros__parameters: {time_limit: 240.0}}\n"
+        imported(MISSION_2023, SAME_EVENTS, limit)
+
+    @pytest.mark.parametrize(
+        "other",
+        [
             "parent_mission_node: {ros__parameters: {time_limit: 300}}\n",
-            same.replace("35", "36"),
-        ):
-            error = refused(imported, MISSION_2023, other)
-            assert error.file == "given1.yaml"
-            assert "contradicts given0.yaml: line" in error.problem
+            SAME_EVENTS.replace("35", "36"),
+        ],
+        ids=["another limit", "another event"],
+    )
+    def test_a_file_must_not_contradict_another(self, imported, other):
+        error = refused(imported, MISSION_2023, other)
+        assert error.file == "given1.yaml"
+        assert "contradicts given0.yaml: line" in error.problem
 
 
 class TestCommand:
-    def test_writes_scenario_and_campaign_and_tells_the_rest(self, write, command):
+    @pytest.fixture
+    def told(self, write, command) -> list[str]:
+        """Lines of an import of two files into two others."""
         write("mission.yaml", MISSION_15)
         write("runner.yaml", RUNNER_15)
         write("sub/keep.txt", "")
-        arguments = [
-            "mission.yaml",
-            "runner.yaml",
-            "--out",
-            "mine.yaml",
-            "--campaign",
-            "sub/campaign.yaml",
-        ]
-        status, out, _ = command("import-config", *arguments)
-        told = out.splitlines()
+        options = ("--out", "mine.yaml", "--campaign", "sub/campaign.yaml")
+        status, out, _ = command("import-config", "mission.yaml", "runner.yaml", *options)
         assert status == 0
+        return out.splitlines()
+
+    @pytest.mark.usefixtures("told")
+    def test_writes_a_scenario(self):
+        assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
+
+    @pytest.mark.usefixtures("told")
+    def test_writes_a_campaign_of_that_scenario(self):
+        assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
+
+    def test_tells_what_is_written(self, told):
         assert told[-2].startswith(
             "mine.yaml is written, based on release15: only revision 1.5 has "
         )
         assert told[-1] == "sub/campaign.yaml is written"
+
+    def test_tells_what_is_not_needed_here(self, told):
         assert any(
             "not needed here" in line and "mission_metrics.result_path" in line for line in told
         )
-        assert load_scenario("mine.yaml").scenario.managers.random.adaptation_period_s == 25
-        assert yaml.safe_load(Path("sub/campaign.yaml").read_text())["scenario"] == "../mine.yaml"
 
     @pytest.mark.parametrize(
         ("arguments", "problem"),
@@ -846,7 +857,7 @@ class TestCommand:
             (["--out", "mine.yaml"], "FILE"),
         ],
     )
-    def test_bad_input_is_one_line_and_nothing_is_written(self, write, command, arguments, problem):
+    def test_bad_input_is_refused_in_one_line(self, write, command, arguments, problem):
         for name, content in (
             ("mission.yaml", MISSION_15),
             ("runner.yaml", RUNNER_15),

@@ -93,9 +93,7 @@ def test_search_is_requested_when_the_mission_starts(name):
 
 
 @pytest.mark.parametrize(("name", "poll_s"), [("2023", 74.35), ("1.5", 73.535)])
-def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(
-    name, poll_s
-):
+def test_the_inspection_takes_over_at_the_poll_that_sees_the_detection(name, poll_s):
     assert Mission(name, 73.45).run().calls[1:3] == [
         ("cancel", poll_s, "search_pipeline"),
         ("request", poll_s, "inspect_pipeline"),

@@ -97,7 +97,7 @@ def test_a_function_is_active_while_the_task_lasts_that_needs_it(fly):
         ("bt_extended", 0.6),
     ],
 )
-def test_a_function_of_the_whole_mission_gets_its_default_mode_at_the_start_and_keeps_it(
+def test_a_function_of_the_whole_mission_stays_in_its_default_mode_from_the_start(
     fly, manager, on_by_s
 ):
     result = fly(NAMED.replace("search_pipeline", "mission_wide"), manager)

@@ -42,7 +42,7 @@ def along_the_line(t_s: float) -> tuple[float, float, float]:
     return -SPEED * t_s, 0.0, -18.75
 
 
-def test_path_goes_there_and_back_along_all_points():
+def test_path_returns_along_all_points():
     path = there_and_back(np.array(LINE))
     assert path[:, :2].tolist() == [list(point) for point in (*LINE, *reversed(LINE))]
 
@@ -175,9 +175,7 @@ def test_switched_on_again_the_distance_counts_from_zero(name, goes_on_s, from_m
 
 
 @pytest.mark.parametrize(("name", "starts_again"), [("2023", True), ("1.5", False)])
-def test_switched_on_again_revision_2023_starts_the_path_and_15_goes_on_with_the_point_not_reached(
-    name, starts_again
-):
+def test_where_a_path_begins_when_switched_on_again_is_the_revisions(name, starts_again):
     following = switched_off(name)
     commanded = following.vehicle.commanded
     following.node.apply(ACTIVE)

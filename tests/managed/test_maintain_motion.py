@@ -73,7 +73,7 @@ def interrupted(name: str, at_s: float) -> Motion:
     ("name", "at_s", "restored"),
     [("2023", 3.0, 6), ("2023", 10.3, 6), ("1.5", 3.0, 0), ("1.5", 10.3, 2)],
 )
-def test_recovery_goes_on_when_deactivated_in_2023_and_is_aborted_in_15(name, at_s, restored):
+def test_whether_recovery_outlasts_its_deactivation_is_the_revisions(name, at_s, restored):
     motion = interrupted(name, at_s)
     motion.env.run()
     assert len(motion.restored) == restored

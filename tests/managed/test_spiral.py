@@ -135,7 +135,7 @@ def test_a_change_of_altitude_skips_one_angle_step_but_no_radius(before_m):
     ],
     ids=["in the box", "x", "y", "z"],
 )
-def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
+def test_reached_means_within_0_4_m_along_each_axis(name, error_m, goes_on):
     search = searching(name)
     search.ticks(1)
     x, y, z = search.last
@@ -145,7 +145,7 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name, error_m, goes_on):
 
 
 @BOTH
-def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name):
+def test_a_set_point_not_reached_is_sent_again_every_11_ticks(name):
     search = searching(name)
     search.ticks(1)
     search.vehicle.put((0.0, 0.0, -19.0))
@@ -219,9 +219,7 @@ def test_inactive_it_sends_nothing(name):
 @pytest.mark.parametrize(
     ("name", "origin", "reached"), [("2023", ORIGIN, 8), ("1.5", (-10.0, 1.0), 1)]
 )
-def test_activated_again_revision_2023_goes_on_with_its_spiral_and_15_starts_afresh_where_it_is(
-    name, origin, reached
-):
+def test_where_a_spiral_begins_when_activated_again_is_the_revisions(name, origin, reached):
     search = searching(name, obeys=True)
     search.ticks(7)
     search.node.apply(INACTIVE)

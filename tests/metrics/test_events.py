@@ -41,7 +41,7 @@ KINDS = (ModeRequested, ModeRefused, ModeSet, ComponentStatus, VisibilityCrossin
         (Said("mission_ended", "time is over"), ("mission_ended", "time is over")),
     ],
 )
-def test_each_has_its_name_and_its_text(happening, texts):
+def test_each_is_written_as_a_name_with_a_text(happening, texts):
     assert tuple(texts_of(happening)) == texts
 
 

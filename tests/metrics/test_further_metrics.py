@@ -69,20 +69,26 @@ def test_a_change_taken_back_in_time_is_undone(changes, undone):
     assert watched.noted.value("adaptations_undone") == undone
 
 
-def test_configurations_are_counted_once_each_and_not_when_passed_through():
+@pytest.mark.parametrize(
+    ("effects", "configurations"),
+    [
+        ([(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b")], [{"a"}, {"a", "x"}, {"b", "x"}]),
+        (
+            [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (4.0, "f", "a")],
+            [{"a"}, {"a", "x"}, {"b", "x"}],
+        ),
+        (
+            [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y")],
+            [{"a"}, {"a", "x"}, {"b", "y"}],
+        ),
+    ],
+    ids=["each", "but once", "not what is passed through at one time"],
+)
+def test_configurations_are_counted(effects, configurations):
     watched = Watched()
-    for t_s, function, mode in [
-        (1.0, "f", "a"),
-        (2.0, "g", "x"),
-        (3.0, "f", "b"),
-        (3.0, "g", "y"),
-        (5.0, "f", "a"),
-    ]:
+    for t_s, function, mode in effects:
         watched.at(t_s).mode_effect(function, Mode(mode, True, {}))
-    watched.at(6.0).mode_effect("g", Mode("x", True, {}))  # f = a, g = x again
-    assert watched.at(7.0).value("configurations") == len(
-        [{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}]
-    )
+    assert watched.at(7.0).value("configurations") == len(configurations)
 
 
 def test_operational_thrusters_are_a_mean_over_time():
@@ -212,11 +218,16 @@ def test_time_before_the_first_measurement_does_not_count(mission):
     assert mission(text).further["requirement_see"] == pytest.approx(1.0)
 
 
+REASONING = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
+
+
 def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission):
-    text = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
-    assert mission(text, "metacontrol").further["reasoning_time_s"] % 0.5 == 0.0
-    assert mission(text, "metacontrol").further["reasoning_time_s"] > 0.0
-    assert mission(text, "none").further["reasoning_time_s"] == 0.0
+    taken_s = mission(REASONING, "metacontrol").further["reasoning_time_s"]
+    assert taken_s % 0.5 == 0.0 < taken_s
+
+
+def test_who_does_not_reason_takes_no_time_for_it(mission):
+    assert mission(REASONING, "none").further["reasoning_time_s"] == 0.0
 
 
 def test_all_of_them_leave_the_mission_as_it_is(mission):

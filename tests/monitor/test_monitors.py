@@ -185,7 +185,7 @@ def test_messages_are_lost_with_their_probability(probability):
     assert sum(lost(probability)) / 2000 == pytest.approx(probability, abs=0.041)
 
 
-def test_all_messages_of_an_outage_are_lost_with_its_ends_and_no_other():
+def test_an_outage_loses_the_messages_from_its_begin_to_its_end():
     missing = [t_s for t_s, is_lost in enumerate(lost(0.0, (60.0, 62.0), (80.0, 80.5))) if is_lost]
     assert missing == [60, 61, 62, 80]
 
@@ -415,12 +415,12 @@ def test_a_level_is_measured_until_the_end_of_the_mission():
     assert BatteryMeasurements(200.0, Timing(1.0, 0.5), 3.5).times_s == [0.5, 1.5, 2.5, 3.5]
 
 
-def test_a_recharged_battery_is_full_and_says_so_at_once(subscriber):
+def test_a_recharged_battery_says_at_once_that_it_is_full(subscriber):
     levels = dict(battery_levels(subscriber, 200.0, 160.7))
     assert (levels[160.5], levels[160.7], levels[161.5]) == pytest.approx((0.195, 1.0, 0.995))
 
 
-def test_a_recharge_at_the_time_of_a_measurement_adds_one_and_no_more():
+def test_a_recharge_at_the_time_of_a_measurement_adds_one():
     level = BatteryMeasurements(200.0, Timing(1.0, 0.5), 4.0)
     level.recharge(2.5)
     assert level.times_s == [0.5, 1.5, 2.5, 2.5, 3.5]

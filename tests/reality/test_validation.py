@@ -170,32 +170,54 @@ def test_a_cluster_that_is_averaged_away_fails_its_share(published, like_publish
     assert ("share", "metacontrol", "found at 120 to 130 s") in found
 
 
-def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(
-    published, like_published, good
-):
+@pytest.fixture(scope="module")
+def of_none_alone(published, like_published, few_resamples):
+    return validate(published, like_published, ("none",))
+
+
+def test_the_result_repeats_with_its_seed(published, like_published, good):
     shares = validated(read_yaml(TARGETS), Targets).shares
     assert validate(published, like_published, MANAGERS, shares=shares).texts({}) == good.texts({})
-    alone = validate(published, like_published, ("none",))
+
+
+def test_the_result_of_a_manager_does_not_depend_on_the_others(good, of_none_alone):
     pandas.testing.assert_frame_equal(
-        alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True)
+        of_none_alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True)
     )
-    assert alone.pairs.empty
+
+
+def test_one_manager_makes_no_pair(of_none_alone):
+    assert of_none_alone.pairs.empty
+
+
+def test_another_seed_resamples_otherwise(published, like_published, of_none_alone):
     other = validate(published, like_published, ("none",), seed=2)
-    assert ends(other.cells.loc[0], "std_ratio") != ends(alone.cells.loc[0], "std_ratio")
+    assert ends(other.cells.loc[0], "std_ratio") != ends(of_none_alone.cells.loc[0], "std_ratio")
 
 
-def test_what_cannot_be_judged_from_few_missions_is_not_met_and_says_so(published):
+@pytest.fixture(scope="module")
+def of_few(published, few_resamples):
+    """A validation with one simulated mission of each manager."""
     few = published.groupby("manager").head(1)
     shares = [
         Share(manager="none", name="of none", of="detections", among={"search_time_s": [(0, 1)]},
               where={"detection_x_m": [(-19, -18)]}, target=(0, 1))
     ]  # fmt: skip
-    found = validate(published, few, MANAGERS, shares=shares)
-    judged = found.targets.set_index("kind")["met"].to_dict()
-    assert judged["std"] is None
-    assert judged["conclusion"] is None
-    assert judged["share"] is None
-    assert not found.all_met
+    return validate(published, few, MANAGERS, shares=shares)
+
+
+@pytest.mark.parametrize("kind", ["std", "conclusion", "share"])
+def test_what_few_missions_cannot_show_is_not_judged(of_few, kind):
+    assert of_few.targets.set_index("kind")["met"].to_dict()[kind] is None
+
+
+def test_what_is_not_judged_is_not_met(of_few):
+    assert not of_few.all_met
+
+
+def test_what_is_not_judged_is_counted_apart(of_few):
+    summary = json.loads(of_few.texts({})[JSON_FILE])["targets_summary"]
+    assert summary["not_judged"] == of_few.targets["met"].isna().sum()
 
 
 @pytest.mark.parametrize(
@@ -209,16 +231,33 @@ def test_a_target_holds_at_its_limits(published, place, met):
     assert found.loc[0, ["kind", "met"]].tolist() == ["mean", met]
 
 
-def test_every_table_is_written_and_the_json_has_them_all(good):
-    files = good.texts({"seed": 1})
-    content = json.loads(files[JSON_FILE])
-    assert content["provenance"] == {"seed": 1}
-    assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
-    assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
-    assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
-    assert len(files[TABLES["cells"]].splitlines()) == 7
-    assert len(files[TABLES["pairs"]].splitlines()) == 7
-    assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
+class TestFiles:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def files(good):
+        return good.texts({"seed": 1})
+
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def content(files):
+        return json.loads(files[JSON_FILE])
+
+    def test_the_json_says_where_the_missions_come_from(self, content):
+        assert content["provenance"] == {"seed": 1}
+
+    def test_the_json_counts_the_targets(self, content):
+        assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
+
+    def test_the_json_has_all_tables(self, content):
+        assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
+        assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
+
+    @pytest.mark.parametrize("name", ["cells", "pairs"])
+    def test_a_table_has_a_line_for_each_manager_or_pair_under_its_header(self, files, name):
+        assert len(files[TABLES[name]].splitlines()) == 7
+
+    def test_the_table_of_targets_has_their_limits(self, files):
+        assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
 
 
 def test_predicted_means_are_told_in_published_standard_deviations(missions):

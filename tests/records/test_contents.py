@@ -137,7 +137,7 @@ def line(*cycle: object) -> dict[str, object]:
     return {**about, "states": states, "cycles": [list(cycle)]}
 
 
-def test_a_cycle_has_its_time_its_state_and_what_was_measured():
+def test_a_cycle_is_a_row_of_three():
     assert MissionLine.model_validate(line(1.5, 0, "2.50")).cycles == [[1.5, 0, "2.50"]]
 
 

@@ -69,3 +69,8 @@ def test_a_requirement_is_a_metric_of_which_more_is_better():
 
 def test_a_swept_value_is_none():
     assert metric_of("signals.water_visibility.period_s") is None
+
+
+def test_a_metric_of_which_one_direction_is_better_has_the_words_to_say_so():
+    metrics = [*METRICS.values(), metric_of("requirement_depth")]
+    assert all(each.less and each.more and each.most for each in metrics if each.better)

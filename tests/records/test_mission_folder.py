@@ -10,15 +10,12 @@ from pathlib import Path
 import pytest
 
 from suave_des import Mission, load_scenario
-from suave_des.errors import InputError
-from suave_des.files import write_beside, write_files
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.records import mission_folder
 from suave_des.records.mission_folder import (
     EVENTS_FILE,
     KNOWLEDGE_FILE,
-    MISSION_FILE,
     TRAJECTORY_FILE,
     knowledge_text,
     mission_files,
@@ -27,10 +24,10 @@ from suave_des.records.mission_folder import (
     read_knowledge,
     read_mission,
     read_missions,
-    read_states,
     record_of,
     scenario_line,
 )
+from tests.helpers.mission_folders import write_cell, write_listed
 
 OBJECTIVE = ObjectiveState("f_generate_search_path", "UNGROUNDED", True)
 FULL = {
@@ -45,23 +42,6 @@ FULL = {
 def state(**parts: object) -> KnowledgeState:
     """A state that has these parts in place of those of FULL."""
     return KnowledgeState.of(**{**FULL, **parts})
-
-
-@pytest.fixture(scope="module")
-def loaded():
-    return load_scenario("seams2023")
-
-
-@pytest.fixture(scope="module")
-def result():
-    """A mission of metacontrol that was recorded."""
-    return Mission("seams2023", "metacontrol", run=1, seed=8, record=True).result()
-
-
-@pytest.fixture
-def folder(result, loaded, tmp_path: Path) -> Path:
-    write_files(tmp_path, mission_files(result, loaded, {"own.py": "abc"}, ("run",)))
-    return tmp_path
 
 
 def test_metrics_are_read_as_they_were(folder, result, loaded):
@@ -93,7 +73,7 @@ def test_the_altitudes_of_search_modes_are_read_as_they_were(folder, loaded):
     assert read_mission(folder).search_altitudes_m == loaded.modes.search_altitudes_m
 
 
-def test_inputs_are_those_of_the_scenario_and_further_ones(folder, loaded):
+def test_further_inputs_join_those_of_the_scenario(folder, loaded):
     assert read_mission(folder).inputs == {**loaded.inputs, "own.py": "abc"}
 
 
@@ -111,122 +91,23 @@ def test_where_it_comes_from_has_no_time_of_day(loaded):
     assert provenance(loaded, {}, ("run",)) == provenance(loaded, {}, ("run",))
 
 
-# What is wrong.
-
-
-def written(path: Path, text: str) -> None:
-    """Write a file of a mission's folder and list it in mission.json, as a mission would have."""
-    write_beside(path.parent, {path.name: text})
-
-
-def replaced(path: Path, line: int, column: str, text: str) -> None:
-    """Write a CSV file with another text in a cell."""
-    lines = path.read_text().splitlines()
-    cells = lines[line - 1].split(",")
-    cells[lines[0].split(",").index(column)] = text
-    lines[line - 1] = ",".join(cells)
-    written(path, "\n".join(lines) + "\n")
-
-
-@pytest.mark.parametrize("text", ["soon", "inf", "nan"])
-@pytest.mark.parametrize("column", ["t_s", "x_m"])
-def test_a_cell_that_is_no_finite_number_is_named_with_its_line(folder, column, text):
-    replaced(folder / TRAJECTORY_FILE, 3, column, text)
-    with pytest.raises(InputError) as caught:
-        read_mission(folder)
-    assert caught.value.place == "line 3"
-    assert caught.value.problem == f"{column}: expected a finite number, got '{text}'"
+# What is missing or odd.
 
 
 def test_an_empty_cell_is_a_missing_value(folder):
-    replaced(folder / TRAJECTORY_FILE, 3, "roll_rad", "")
+    write_cell(folder / TRAJECTORY_FILE, 3, "roll_rad", "")
     assert read_mission(folder).trajectory["roll_rad"].isna().to_list()[:3] == [False, True, False]
 
 
-@pytest.mark.parametrize("column", ["t_s", "x_m", "y_m", "z_m"])
-def test_but_each_point_has_a_time_and_a_place(folder, column):
-    replaced(folder / TRAJECTORY_FILE, 3, column, "")
-    with pytest.raises(InputError, match=f"line 3: {column}: expected a finite number, got ''"):
-        read_mission(folder)
-
-
-def test_a_time_before_that_of_the_row_above_is_told_with_its_line(folder):
-    replaced(folder / TRAJECTORY_FILE, 3, "t_s", "100.0")
-    with pytest.raises(
-        InputError, match=r"line 4: t_s: 0\.4 s is before the time of the row above"
-    ):
-        read_mission(folder)
-
-
 def test_a_detail_that_is_the_word_none_is_no_missing_value(folder):
-    replaced(folder / EVENTS_FILE, 2, "detail", "none")
+    write_cell(folder / EVENTS_FILE, 2, "detail", "none")
     assert read_mission(folder).events["detail"].iloc[0] == "none"
-
-
-@pytest.mark.parametrize("name", [EVENTS_FILE, TRAJECTORY_FILE])
-def test_a_file_without_rows_is_told(folder, name):
-    written(folder / name, (folder / name).read_text().splitlines()[0] + "\n")
-    with pytest.raises(InputError, match=f"{name}: is empty"):
-        read_mission(folder)
-
-
-@pytest.mark.parametrize("name", [MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE])
-def test_a_file_that_is_missing_is_told(folder, name):
-    (folder / name).unlink()
-    with pytest.raises(InputError, match=name):
-        read_mission(folder)
-
-
-def test_a_column_that_is_missing_is_told(folder):
-    path = folder / TRAJECTORY_FILE
-    written(path, path.read_text().replace("x_m", "x", 1))
-    with pytest.raises(InputError, match="x_m is missing"):
-        read_mission(folder)
 
 
 def test_angles_that_are_missing_are_zero(folder):
     path = folder / TRAJECTORY_FILE
-    written(path, path.read_text().replace("roll_rad", "roll", 1))
+    write_listed(path, path.read_text().replace("roll_rad", "roll", 1))
     assert set(read_mission(folder).trajectory["roll_rad"]) == {0.0}
-
-
-@pytest.mark.parametrize("key", ["scenario", "manager", "search_time_s"])
-def test_a_metric_that_is_missing_is_told(folder, key):
-    mission = json.loads((folder / MISSION_FILE).read_text())
-    del mission["metrics"][key]
-    (folder / MISSION_FILE).write_text(json.dumps(mission))
-    with pytest.raises(InputError, match=rf"metrics\.{key}: is missing"):
-        read_mission(folder)
-
-
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [
-        ([], r"\[\] should be a mapping"),
-        ({}, "metrics: is missing"),
-        ({"metrics": 1, "scenario": 2}, "metrics: 1 should be a mapping"),
-    ],
-)
-def test_what_is_no_record_of_a_mission_is_told(folder, content, told):
-    (folder / MISSION_FILE).write_text(json.dumps(content))
-    with pytest.raises(InputError, match=f"{MISSION_FILE}: {told}"):
-        read_mission(folder)
-
-
-def test_a_scenario_that_cannot_be_read_today_is_told_with_what_to_do(folder):
-    mission = json.loads((folder / MISSION_FILE).read_text())
-    mission["scenario"]["tide"] = 1
-    (folder / MISSION_FILE).write_text(json.dumps(mission))
-    with pytest.raises(InputError, match=r"scenario\.tide: unknown key .* run the mission again"):
-        read_mission(folder)
-
-
-@pytest.mark.parametrize("read", [read_mission, read_states])
-def test_a_file_that_was_changed_since_the_mission_is_told(folder, read):
-    path = folder / KNOWLEDGE_FILE
-    path.write_text(path.read_text() + path.read_text().splitlines()[-1] + "\n")
-    with pytest.raises(InputError, match=f"{KNOWLEDGE_FILE}: is not as {MISSION_FILE} beside it"):
-        read(folder)
 
 
 # Knowledge states.
@@ -300,23 +181,6 @@ def test_the_scenario_has_what_is_swept_as_at_the_missions_point(tmp_path):
     path.write_text(scenario_line(scenario) + "".join(lines))
     periods = [each.scenario.signals["water_visibility"].period_s for each in read_missions(path)]
     assert periods == [40.0, 120.0]
-
-
-def test_a_line_that_is_damaged_is_named(tmp_path):
-    path = tmp_path / KNOWLEDGE_FILE
-    path.write_text(knowledge_text([KnowledgeRecord(1.0, state())]) + "{\n")
-    with pytest.raises(InputError, match=r"line 2: is damaged: .* \(run the mission again\)"):
-        read_knowledge(path)
-
-
-def test_a_state_that_a_table_does_not_have_is_damage(tmp_path):
-    path = tmp_path / "states.jsonl"
-    line = json.loads(mission_line("metacontrol", 0, 1, [KnowledgeRecord(1.0, state())]))
-    line["cycles"][0][1] = 7
-    head = scenario_line(load_scenario("seams2023").scenario)
-    path.write_text(head + json.dumps(line) + "\n")
-    with pytest.raises(InputError, match=r"line 2: is damaged: .* \(run the campaign again\)"):
-        list(read_missions(path))
 
 
 def test_versions_name_every_library_that_decides():

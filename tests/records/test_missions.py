@@ -7,7 +7,6 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.errors import InputError
 from suave_des.records.missions import SHARING, missions_in, missions_of
 from suave_des.records.store import MANIFEST_FILE, RUNS_FILE, STORE_FILE, Store
 
@@ -47,35 +46,6 @@ def test_folders_of_the_same_name_are_told_apart_by_those_above(tmp_path):
         (tmp_path / place).mkdir()
         folders.append(campaign(tmp_path / place / "out", "sea,none,100,2,1,1"))
     assert missions_in(folders).frame["source"].to_list() == ["one/out", "other/out"]
-
-
-def test_a_folder_that_is_given_twice_is_told(tmp_path):
-    folder = campaign(tmp_path / "one", "sea,none,100,2,1,1")
-    with pytest.raises(InputError, match="is given twice"):
-        missions_in([folder, tmp_path / "one" / ".." / "one"])
-
-
-def test_that_nothing_is_given_is_told():
-    with pytest.raises(InputError, match="no results are given"):
-        missions_in([])
-
-
-def test_a_folder_without_results_is_told(tmp_path):
-    with pytest.raises(InputError, match="has no result files"):
-        missions_in(tmp_path)
-
-
-def test_a_campaign_that_has_not_written_its_results_is_told_with_what_does_so(tmp_path):
-    with closing(Store(tmp_path / STORE_FILE)) as store:
-        store.begin({})
-    with pytest.raises(InputError, match=r"ended before its result files .* campaign --resume"):
-        missions_in(tmp_path)
-
-
-def test_a_mission_that_is_there_twice_is_told(tmp_path):
-    folder = campaign(tmp_path / "one", "sea,none,100,2,1,1", "sea,none,90,2,1,1")
-    with pytest.raises(InputError, match="run 1 of none with seed 1 is there twice"):
-        missions_in(folder)
 
 
 def test_a_mission_at_another_swept_value_is_another(tmp_path):
@@ -145,22 +115,6 @@ def test_a_single_file_is_read_with_the_manifest_beside_it(tmp_path):
 FRAME = pandas.DataFrame(
     {"manager": ["none"], "search_time_s": [100], "distance_inspected_m": [2.0]}
 )
-
-
-@pytest.mark.parametrize("column", list(FRAME))
-def test_a_column_that_a_frame_lacks_is_told(column):
-    with pytest.raises(InputError, match=f"has no column '{column}'"):
-        missions_of(FRAME.drop(columns=column))
-
-
-def test_a_frame_without_rows_is_told():
-    with pytest.raises(InputError, match="has no missions"):
-        missions_of(FRAME.iloc[:0])
-
-
-def test_a_metric_of_a_frame_that_is_no_number_is_told():
-    with pytest.raises(InputError, match="something that is no number"):
-        missions_of(FRAME.assign(search_time_s="soon"))
 
 
 def test_a_frame_knows_how_many_runs_share_draws():

@@ -19,6 +19,7 @@ from scipy import stats
 from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
+from suave_des.frame import CampaignFrame
 from suave_des.records.missions import missions_in
 from suave_des.resources import find
 from suave_des.results import statistics
@@ -123,12 +124,14 @@ class TestPublishedRuns:
                     count += 1
         assert count == 6
 
-    def test_shares_have_wilsons_interval_and_fishers_test(self, published):
+    def test_a_share_has_wilsons_interval(self, published):
         found = summary(published, "random", "pipeline_found")
         assert found.mean == 0.8
         assert interval(found, "mean") == pytest.approx(
             tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson"))
         )
+
+    def test_two_shares_have_fishers_test(self, published):
         tested = difference(published, "none", "random", "pipeline_found")
         assert tested.p == pytest.approx(stats.fisher_exact([[19, 1], [16, 4]]).pvalue, abs=1e-12)
 
@@ -209,7 +212,7 @@ class TestCampaign:
 
 
 class TestSweep:
-    def test_runs_are_independent_and_points_are_not(self, tmp_path):
+    def test_the_points_of_a_run_count_as_one(self, tmp_path):
         values = {"visibility.period_s": [60.0, 80.0, 100.0]}
         frame = run_campaign(
             "seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values
@@ -281,9 +284,7 @@ def test_half_widths_are_a_twentieth_of_the_greater_mean_unless_the_metric_has_i
     assert list(asked.differences["half_width"]) == [2.0]
 
 
-def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_named_as_such(
-    tmp_path,
-):
+def test_points_of_which_the_same_is_concluded_share_a_sentence(tmp_path):
     values = {"thruster_events.0.time_s": [400.0, 400.0000001]}  # after the time limit
     run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out", sweep=values)
     run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "plain")
@@ -292,12 +293,17 @@ def test_points_of_which_the_same_is_concluded_share_a_sentence_and_ties_are_nam
         found.conclusion.startswith("time_s 400.0; time_s 400.0000001: ")
         and "not swept: " in found.conclusion
     )
+
+
+def test_a_manager_that_is_equal_to_the_best_in_all_pairs_is_named():
     ties = compare_frame(runs(a=[100.0, 110.0], b=[100.0, 110.0], c=[150.0, 151.0])).conclusion
     assert ties.startswith(
         "No difference of the mean search time is shown between a, which has, with others, the best mean, "
     )
     assert "b (equal in all 2 pairs)" in ties
-    # a is worse in its pairs with b
+
+
+def test_a_best_mean_is_said_to_be_that_of_all_runs_where_pairs_say_otherwise():
     frame = runs(a=[120.0, 110.0, 50.0], b=[110.0, 110.0], c=[150.0])
     more = compare_frame(frame).conclusion
     assert "between a, which has the best mean of all its runs, and b" in more
@@ -376,10 +382,12 @@ def test_runs_that_differ_most_are_named_with_the_command_that_replays_them(camp
 
 
 class TestFewValues:
-    def test_one_run_has_a_mean_and_no_interval(self):
-        comparison = compare_frame(runs(a=[100.0], b=[120.0]))
-        found = summary(comparison, "a")
+    def test_one_run_has_no_interval(self):
+        found = summary(compare_frame(runs(a=[100.0], b=[120.0])), "a")
         assert (found.mean, interval(found, "mean"), found.std) == (100.0, None, None)
+
+    def test_one_pair_of_runs_shows_no_difference(self):
+        comparison = compare_frame(runs(a=[100.0], b=[120.0]))
         assert not (comparison.differences["p_holm"] < 0.05).any()
 
     def test_equal_values_do_not_say_how_many_runs_are_needed(self):
@@ -453,14 +461,17 @@ class TestConclusions:
 class TestCaveats:
     """Missions that never found the pipeline, or have no value, are told of."""
 
-    def test_their_search_time_and_their_number_are_reported(self):
+    def test_the_search_time_with_which_they_count_is_reported(self):
         notes = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])).notes
         (note,) = (each for each in notes if "mean up to that limit" in each)
         assert note.startswith(
             "missions that had not found the pipeline by 300 s (a 1 of 3) count with 300 s:"
         )
-        frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])
-        assert f"% Note: {note}.\n" in compare_frame(frame).latex()
+
+    def test_notes_stand_in_latex(self):
+        comparison = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0]))
+        (note,) = (each for each in comparison.notes if "mean up to that limit" in each)
+        assert f"% Note: {note}.\n" in comparison.latex()
 
     def test_missions_that_are_left_out_are_reported(self):
         frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 110.0])
@@ -488,33 +499,46 @@ def test_a_choice_that_makes_no_sense_is_refused(choices, words):
         compare_folders([PUBLISHED], **choices)
 
 
-def test_the_frame_of_a_campaign_is_compared_and_drawn():
-    frame = api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
-    comparison = frame[frame["run"] > 1].compare(metrics=["distance_inspected_m"])
+@pytest.fixture(scope="module")
+def frame_of_a_campaign() -> CampaignFrame:
+    return api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
+
+
+def test_the_frame_of_a_campaign_is_compared(frame_of_a_campaign):
+    some = frame_of_a_campaign[frame_of_a_campaign["run"] > 1]
+    comparison = some.compare(metrics=["distance_inspected_m"])
     assert [(each.group, each.other, each.n) for each in rows(comparison.differences)] == [
         ("none", "bt", 3)
     ]
     assert str(comparison).startswith(comparison.conclusion[:60])
-    assert len(frame.figure().axes) == 2
 
 
-def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole():
-    long = [
-        "a_module_with_a_long_name:AndAClassWithAnEvenLongerName",
-        "another_module_of_a_thesis:AnotherLongManager",
-    ]
-    frame = runs(
-        **{
-            "none": [100.0, 120.0, 140.0],
-            long[0]: [90.0, 95.0, 130.0],
-            long[1]: [80.0, 85.0, 120.0],
-        }
-    )
-    for width in (80, 95):
-        text = compare_frame(frame).text(width)
-        assert max(map(len, text.splitlines())) <= width
-        joined = "".join(line.split("  ")[0] or line.strip() for line in text.splitlines())
-        assert all(name in joined for name in long)
+def test_the_frame_of_a_campaign_is_drawn(frame_of_a_campaign):
+    assert len(frame_of_a_campaign.figure().axes) == 2
+
+
+LONG_NAMES = [
+    "a_module_with_a_long_name:AndAClassWithAnEvenLongerName",
+    "another_module_of_a_thesis:AnotherLongManager",
+]
+
+
+@pytest.fixture(scope="module")
+def of_long_names() -> Comparison:
+    times_s = [100.0, 120.0, 140.0], [90.0, 95.0, 130.0], [80.0, 85.0, 120.0]
+    return compare_frame(runs(**dict(zip(["none", *LONG_NAMES], times_s, strict=True))))
+
+
+@pytest.mark.parametrize("width", [80, 95])
+def test_tables_with_long_names_of_managers_fit_the_width(of_long_names, width):
+    assert max(map(len, of_long_names.text(width).splitlines())) <= width
+
+
+@pytest.mark.parametrize("width", [80, 95])
+def test_tables_show_long_names_of_managers_whole(of_long_names, width):
+    lines = of_long_names.text(width).splitlines()
+    joined = "".join(line.split("  ")[0] or line.strip() for line in lines)
+    assert all(name in joined for name in LONG_NAMES)
 
 
 def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path):
@@ -525,8 +549,11 @@ def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path):
         assert (found.n, found.mean) == (3, 0.0)
 
 
-def by_two_parameters() -> Comparison:
-    """Three managers at two by two points of a sweep: each a constant slower than the one before."""
+@pytest.fixture(scope="module")
+def latex_by_two_parameters() -> list[str]:
+    """Tables of three managers at two by two points of a sweep: each a constant slower than the
+    one before.
+    """
     names = ["none", "metacontrol", "tests.managers:Reactive"]
     columns = ["manager", "run", "visibility.minimum", "managers.metacontrol.reasoning_period_s"]
     frame = pandas.DataFrame(product(names, range(1, 26), [1.0, 2.0], [0.5, 5.0]), columns=columns)
@@ -538,20 +565,36 @@ def by_two_parameters() -> Comparison:
         distance_inspected_m=50.0 - slower_s,
         pipeline_found=True,
     )
-    return compare_frame(frame, by=columns[2:], metrics=["search_time_s", "distance_inspected_m"])
+    metrics = ["search_time_s", "distance_inspected_m"]
+    return compare_frame(frame, by=columns[2:], metrics=metrics).latex().split("\\begin{table}")[1:]
 
 
-def test_latex_of_a_sweep_has_the_points_as_headings_and_fits_a_page():
-    tables = by_two_parameters().latex().split("\\begin{table}")[1:]
+def test_latex_of_a_sweep_has_the_points_as_headings(latex_by_two_parameters):
     point = "minimum 1, reasoning\\_period\\_s 0.5"
-    labels = ["means", "differences-search-time-s", "differences-distance-inspected-m"]
-    for table, label in zip(tables, labels, strict=True):
-        assert f"\\label{{tab:{label}}}" in table
+    for table in latex_by_two_parameters:
         assert table.count(f"\\multicolumn{{5}}{{l}}{{{point}}} \\\\") == 1
         assert table.count("\\multicolumn{5}{l}{minimum") == 4
+
+
+def test_each_table_in_latex_has_a_label(latex_by_two_parameters):
+    labels = ["means", "differences-search-time-s", "differences-distance-inspected-m"]
+    for table, label in zip(latex_by_two_parameters, labels, strict=True):
+        assert f"\\label{{tab:{label}}}" in table
+
+
+def test_latex_of_a_sweep_fits_a_page(latex_by_two_parameters):
+    for table in latex_by_two_parameters:
         shown = [line.strip() for line in table.splitlines() if line.endswith("\\\\")]
         assert max(map(len, shown)) < 110
         assert not any("  " in line or " - " in line for line in shown)
-    # By hand: 10 s and the rest of a run's number by 3, of 25 runs; ± 2.064 times 0.8165 / 5.
-    assert "none $-$ metacontrol & $-11.00$ & $-11.3$ to $-10.7$ & $-1.00$ &" in tables[1]
-    assert "\\par\\smallskip\\footnotesize 25 missions for each manager at each point." in tables[0]
+
+
+def test_a_row_of_differences_is_that_by_hand(latex_by_two_parameters):
+    # 10 s and the rest of a run's number by 3, of 25 runs; ± 2.064 times 0.8165 / 5.
+    row = "none $-$ metacontrol & $-11.00$ & $-11.3$ to $-10.7$ & $-1.00$ &"
+    assert row in latex_by_two_parameters[1]
+
+
+def test_latex_says_how_many_missions_there_are(latex_by_two_parameters):
+    words = "\\par\\smallskip\\footnotesize 25 missions for each manager at each point."
+    assert words in latex_by_two_parameters[0]

@@ -63,7 +63,7 @@ def test_ranks_are_said_of_ranks_alone(effect, sentence):
     assert found == f"{means} {sentence} {PAIRS}"
 
 
-def test_means_and_ranks_that_disagree_are_said_to():
+def test_a_disagreement_of_means_with_ranks_is_said():
     found = conclusion(difference(EARLIER, 0.01, effect=0.3, p_holm=0.016), SEARCH_TIME)
     assert found == (
         "a finds the pipeline 5.00 s sooner than b on average (95% interval 3.00 to 7.00; 200 pairs, Student's t,"
@@ -145,7 +145,7 @@ def overall(metric: Metric, means: dict[str, float], *rows: dict[str, Any]) -> s
     return overall_conclusion(metric, rows, means, list(means))
 
 
-def test_the_best_of_all_is_named_so_on_average_and_its_ranks_and_pairs_apart():
+def test_the_best_of_all_is_named_by_means_then_ranks_then_pairs():
     rows = (
         difference(EARLIER, 0.01, effect=-0.4, p_holm=0.002, tests=3),
         difference(EARLIER, 0.02, effect=0.3, p_holm=0.016, tests=3, other="c"),

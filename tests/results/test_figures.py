@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pandas
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -13,7 +14,7 @@ from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.estimates import mean_of
 from suave_des.records.mission_folder import MissionRecord, read_mission
-from suave_des.records.missions import missions_of, read_missions
+from suave_des.records.missions import Missions, missions_of, read_missions
 from suave_des.resources import find
 from suave_des.results import style
 from suave_des.results.figures import (
@@ -49,22 +50,36 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_map_shows_every_mode_and_what_happened(mission):
+@pytest.fixture(scope="module")
+def legend_of_the_map(mission: Path) -> list[str]:
     figure = draw_map(read_mission(mission))
-    told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    trajectory = (mission / "trajectory.csv").read_text()
-    words = {
-        "fd_spiral_low": "search, low",
-        "fd_spiral_medium": "search, medium",
-        "__DEFAULT__": "search, default altitude",
-        "fd_follow_pipeline": "follow the pipeline",
-    }
-    for mode, text in words.items():
-        assert (text in told) == (mode in trajectory)
-    assert any(text.startswith("thruster 1 failed, 36 s") for text in told)
-    assert any(text.startswith("pipeline detected, ") for text in told)
+    return [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+
+
+@pytest.mark.parametrize(
+    ("mode", "text"),
+    [
+        ("fd_spiral_low", "search, low"),
+        ("fd_spiral_medium", "search, medium"),
+        ("__DEFAULT__", "search, default altitude"),
+        ("fd_follow_pipeline", "follow the pipeline"),
+    ],
+)
+def test_the_map_shows_the_modes_of_the_mission(mission, legend_of_the_map, mode, text):
+    assert (text in legend_of_the_map) == (mode in (mission / "trajectory.csv").read_text())
+
+
+@pytest.mark.parametrize("text", ["thruster 1 failed, 36 s", "pipeline detected, "])
+def test_the_map_shows_what_happened(legend_of_the_map, text):
+    assert any(each.startswith(text) for each in legend_of_the_map)
+
+
+def test_a_mode_of_ones_own_is_said_in_words():
     assert style.mode_words("fd_spiral_very_low") == "search, very low"
-    assert style.VERMILION not in style.OTHER_MODES  # the colour of failures
+
+
+def test_no_mode_has_the_colour_of_failures():
+    assert style.VERMILION not in style.OTHER_MODES
 
 
 @pytest.mark.parametrize(
@@ -185,12 +200,20 @@ def test_a_single_mission_of_a_manager_with_an_awkward_name_is_drawn(tmp_path):
 
 
 class TestTimeline:
-    def test_shows_modes_tasks_failures_and_adaptations(self, mission):
-        record = read_mission(mission)
-        figure = draw_timeline(record)
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def figure(mission: Path) -> Figure:
+        return draw_timeline(read_mission(mission))
+
+    def test_has_a_row_for_tasks_before_those_of_modes(self, figure):
         rows = [tick.get_text() for tick in figure.axes[1].get_yticklabels()]
         assert rows[:2] == ["task", "search"]
-        assert "thruster 1" in rows
+
+    def test_has_a_row_for_a_failure(self, figure):
+        assert "thruster 1" in [tick.get_text() for tick in figure.axes[1].get_yticklabels()]
+
+    def test_lists_all_adaptations(self, figure, mission):
+        record = read_mission(mission)
         listed = [text.get_text() for text in figure.axes[-1].texts]
         assert len(listed) == len(adaptations(record)) == record.metrics["adaptations"] > 3
         assert listed[0].startswith("A  ")
@@ -231,8 +254,10 @@ class TestBattery:
         assert len(spirals) > 1
         assert modes == [{span.what} for span in spirals]
 
-    def test_it_is_drawn_and_named_as_a_cause(self, record):
+    def test_its_level_is_drawn(self, record):
         assert any("battery" in axes.get_ylabel() for axes in draw_map(record).axes)
+
+    def test_its_level_is_named_as_a_cause(self, record):
         causes = [each.cause for each in adaptations(record)]
         assert len(causes) == record.metrics["adaptations"]
         assert "battery recharged" in causes
@@ -279,29 +304,44 @@ def texts_of(figure: Figure) -> list[str]:
     return [" ".join(each.get_text().split()) for each in figure.findobj(Text)]
 
 
-def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(two_limits):
-    texts = texts_of(draw_missions(missions_of(two_limits), "distributions"))
-    assert "none (n = 4)" in texts
-    assert any(
-        text.startswith("missions at all points of the sweep: mission: time limit")
-        for text in texts
-    )
+@pytest.fixture(scope="module")
+def texts_of_a_sweep(two_limits: pandas.DataFrame) -> list[str]:
+    return texts_of(draw_missions(missions_of(two_limits), "distributions"))
+
+
+def test_what_shows_missions_of_a_sweep_shows_all_of_them(texts_of_a_sweep):
+    assert "none (n = 4)" in texts_of_a_sweep
+
+
+def test_what_shows_missions_of_a_sweep_says_so(texts_of_a_sweep):
+    words = "missions at all points of the sweep: mission: time limit"
+    assert any(text.startswith(words) for text in texts_of_a_sweep)
 
 
 class TestDifferences:
     """Differences between managers, run by run."""
 
-    def test_show_each_run_the_mean_and_the_runs_at_the_ends(self):
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def axes() -> Axes:
+        """Of five runs, in which b is sooner by 1, 2, 3, 4 and 40 s."""
         frame = sweep_frame(1, 5).drop(columns=["start.x_m", "start.y_m"])
         other = frame.assign(
             manager="b", search_time_s=frame["search_time_s"] - [1.0, 2.0, 3.0, 4.0, 40.0]
         )
-        axes = draw_missions(missions_of(pandas.concat([frame, other])), "differences").axes[0]
+        return draw_missions(missions_of(pandas.concat([frame, other])), "differences").axes[0]
+
+    def test_show_each_run(self, axes):
         rain = next(line for line in axes.get_lines() if len(line.get_xdata()) == 5)
         assert sorted(rain.get_xdata()) == [1.0, 2.0, 3.0, 4.0, 40.0]
+
+    def test_name_the_runs_at_the_ends(self, axes):
         assert [text.get_text() for text in axes.texts] == ["run 1", "run 5"]
-        # so that the line at 0 does not cross them
+
+    def test_names_of_runs_are_not_crossed_by_the_line_at_0(self, axes):
         assert all(text.get_bbox_patch() for text in axes.texts)
+
+    def test_show_the_interval_of_the_mean(self, axes):
         low, high = axes.containers[0][2][0].get_segments()[0][:, 0]
         assert (low, high) == pytest.approx(mean_of([1.0, 2.0, 3.0, 4.0, 40.0]).interval)
 
@@ -321,17 +361,33 @@ class TestDifferences:
             )
 
 
-def test_a_heat_map_has_the_means_as_numbers_and_says_of_how_many_runs_as_a_sweep_does():
-    frame = sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2)
-    figure = draw_heat_map(missions_of(frame), ["depth", "start.y_m"])
+def of_three_parameters() -> Missions:
+    return missions_of(sweep_frame(4, 2).assign(depth=lambda each: each["start.x_m"] // 2))
+
+
+@pytest.fixture(scope="module")
+def heat_map() -> Figure:
+    return draw_heat_map(of_three_parameters(), ["depth", "start.y_m"])
+
+
+def test_a_heat_map_has_the_means_as_numbers(heat_map):
     # half the interval of 110 and 120: 12.7062 (Student's t) times 7.0711 / sqrt(2)
-    assert [text.get_text() for text in figure.axes[0].texts] == ["115.00", "±63.53"] * 4
+    assert [text.get_text() for text in heat_map.axes[0].texts] == ["115.00", "±63.53"] * 4
+
+
+def test_a_heat_map_says_of_how_many_runs_it_has_means(heat_map):
     words = "means of n = 2 runs, each averaged over start: x (m); ± half their 95% intervals"
-    assert words in texts_of(figure)
+    assert words in texts_of(heat_map)
+
+
+def test_a_heat_map_of_three_parameters_is_refused():
     with pytest.raises(InputError, match="of two swept parameters, and there are 3"):
-        draw_heat_map(missions_of(frame))
+        draw_heat_map(of_three_parameters())
+
+
+def test_a_sweep_says_of_how_many_runs_it_has_means():
     text = "means of n = 2 runs, each averaged over the parameters of the other panels"
-    assert text in texts_of(draw_sweep(missions_of(frame)))
+    assert text in texts_of(draw_sweep(of_three_parameters()))
 
 
 @pytest.mark.parametrize("kind", ["map", "timeline"])

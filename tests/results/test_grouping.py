@@ -262,7 +262,7 @@ def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder, tmp_path
     assert any("every 12 runs, of which some share a draw" in note for note in comparison.notes)
 
 
-def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none():
+def test_intervals_of_shares_of_draws_stay_between_0_1():
     found = [True] * 39 + [False]
     cells = [
         (manager, run + 1, found[run] or manager == "a") for manager in "ab" for run in range(40)

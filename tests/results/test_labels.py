@@ -1,5 +1,6 @@
 """Names of managers as a paper's readers are to see them."""
 
+import contextlib
 import json
 import re
 from pathlib import Path
@@ -14,7 +15,7 @@ PUBLISHED = Path(__file__).parents[2] / "scenarios" / "published" / "seams2023_r
 
 
 @pytest.mark.parametrize("form", ["table", "csv", "markdown", "latex"])
-def test_a_label_stands_wherever_the_name_did_and_nothing_else_changes(tmp_path, form):
+def test_a_label_only_replaces_the_name(tmp_path, form):
     asked = ("compare", str(PUBLISHED), "--format", form)
     plain = command_here(*asked, "--managers", "none,metacontrol", cwd=tmp_path).stdout
     labelled = command_here(
@@ -54,45 +55,60 @@ runs: 3
 """
 
 
-@pytest.fixture
-def labelled(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def labelled(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the campaign of a file that has a label, in `out`."""
-    (tmp_path / "c.yaml").write_text(CAMPAIGN)
-    done = command_here("campaign", "c.yaml", "--out", "out", cwd=tmp_path)
+    folder = tmp_path_factory.mktemp("labelled")
+    (folder / "c.yaml").write_text(CAMPAIGN)
+    done = command_here("campaign", "c.yaml", "--out", "out", cwd=folder)
     assert done.returncode == 0 and "No adaptation " in done.stdout
-    return tmp_path
+    return folder
 
 
 def content_of(page: str) -> dict[str, Any]:
     return json.loads(re.search(r'application/json"[^>]*>(.*?)</script>', page, re.DOTALL).group(1))
 
 
-def test_a_campaign_file_s_label_stands_in_tables_figures_and_the_report(labelled):
-    for form in ("table", "latex"):
-        shown = command_here("compare", "out", "--format", form, cwd=labelled).stdout
-        assert "No adaptation" in shown
-        assert not re.search(r"^(none|bt - none) ", shown, re.MULTILINE)
+@pytest.mark.parametrize("form", ["table", "latex"])
+def test_a_campaign_file_s_label_stands_in_tables(labelled, form):
+    shown = command_here("compare", "out", "--format", form, cwd=labelled).stdout
+    assert "No adaptation" in shown
+    assert not re.search(r"^(none|bt - none) ", shown, re.MULTILINE)
+
+
+def test_a_campaign_file_s_label_stands_in_figures(labelled):
     assert command_here("figure", "out", "--out", "f.svg", cwd=labelled).returncode == 0
     assert "No adaptation" in (labelled / "f.svg").read_text()
-    drawn = content_of(report_page([labelled / "out"]))["results"]["drawn"]
-    assert drawn["groups"] == ["No adaptation", "bt"]
-    assert drawn["managers"] == ["none", "bt"]  # for the command that replays a mission
 
 
-def test_managers_are_named_by_their_names_or_labels_and_replays_by_names(labelled):
-    for name in ("none", "No adaptation"):
-        asked = ("compare", "out", "--managers", f"bt,{name}", "--against", name)
-        assert "No adaptation" in command_here(*asked, cwd=labelled).stdout
-    replayed = command_here("compare", "out", cwd=labelled).stdout
-    assert re.search(
-        r"suave-des replay out --run \d --managers none,bt", " ".join(replayed.split())
-    )
+@pytest.fixture(scope="module")
+def report(labelled: Path) -> dict[str, Any]:
+    """What the report of the campaign shows."""
+    with contextlib.chdir(labelled):
+        return content_of(report_page([Path("out")]))
 
 
-def test_a_report_of_labelled_managers_has_their_ways(labelled, monkeypatch):
-    monkeypatch.chdir(labelled)
-    paths = content_of(report_page([Path("out")]))["ways"]["paths"]
-    assert {path["group"] for path in paths} == {0, 1}
+def test_a_campaign_file_s_label_stands_in_the_report(report):
+    assert report["results"]["drawn"]["groups"] == ["No adaptation", "bt"]
+
+
+def test_the_report_replays_managers_by_their_names(report):
+    assert report["results"]["drawn"]["managers"] == ["none", "bt"]
+
+
+def test_a_report_of_labelled_managers_has_their_ways(report):
+    assert {path["group"] for path in report["ways"]["paths"]} == {0, 1}
+
+
+@pytest.mark.parametrize("name", ["none", "No adaptation"])
+def test_a_manager_is_chosen_by_its_name_or_label(labelled, name):
+    asked = ("compare", "out", "--managers", f"bt,{name}", "--against", name)
+    assert "No adaptation" in command_here(*asked, cwd=labelled).stdout
+
+
+def test_the_command_that_replays_has_the_names_of_managers(labelled):
+    shown = " ".join(command_here("compare", "out", cwd=labelled).stdout.split())
+    assert re.search(r"suave-des replay out --run \d --managers none,bt", shown)
 
 
 def test_the_command_s_label_goes_before_the_file_s(labelled):

@@ -4,6 +4,7 @@ intervals hold.
 
 import itertools
 import math
+from functools import cache
 
 import numpy as np
 import pandas
@@ -169,7 +170,7 @@ def test_signed_ranks_without_ties_are_scipys(n):
         assert found[name] == pytest.approx(expected, rel=1e-9)
 
 
-def test_infinite_values_differ_most_by_ranks_and_not_from_each_other():
+def test_signed_ranks_take_infinite_values():
     first = np.array([math.inf, math.inf, 1.0, 9.0, 5.0])
     second = np.array([math.inf, 0.0, 3.0, 4.0, math.inf])
     # Differences: 0, inf, -2, 5, -inf with ranks (inf tied) 3.5, 1, 2, 3.5.
@@ -215,7 +216,7 @@ def test_pairing_divides_the_variance_by_a_ratio_that_needs_a_spread_of_the_diff
         ([math.nan, math.nan, 104.0, 105.0], 2),
     ],
 )
-def test_two_runs_in_common_are_a_pair_of_samples_and_one_is_not(b, n):
+def test_pairing_needs_two_runs_in_common(b, n):
     (found,) = rows(compared(a=[100.0, 110.0, 121.0, 133.0], b=b).differences)
     assert found.paired is (n == 2)
     assert (found.n, found.n_other) == (n, n)
@@ -303,13 +304,18 @@ def coverage_of_differences(n: int, m: int, repetitions: int) -> float:
     return covered / repetitions
 
 
-def test_intervals_of_a_mean_and_of_a_difference_cover_the_truth():
-    # Of 80 intervals of exactly 95%, 69 or more cover in all but one of a thousand draws.
+# Of 80 intervals of exactly 95%, 69 or more cover in all but one of a thousand draws.
+
+
+def test_intervals_of_a_mean_cover_the_truth():
     assert coverage_of_means(40, 80) >= 69 / 80
+
+
+def test_intervals_of_a_difference_cover_the_truth():
     assert coverage_of_differences(40, 60, 80) >= 69 / 80
 
 
-def test_intervals_cover_the_truth_where_most_runs_differ_little_and_a_few_by_far():
+def test_intervals_cover_the_truth_where_a_few_runs_differ_by_far():
     chance = np.random.default_rng(3)
     covered = 0
     for _ in range(200):
@@ -320,21 +326,38 @@ def test_intervals_cover_the_truth_where_most_runs_differ_little_and_a_few_by_fa
     assert covered / 200 >= 0.91  # a bootstrap's covers in 84%
 
 
-@pytest.mark.parametrize(
+PAIRS = pytest.mark.parametrize(
     ("both", "only_first", "only_second"), [(0.93, 0.03, 0.01), (0.7, 0.15, 0.05), (1.0, 0.0, 0.0)]
 )
-def test_intervals_of_shares_in_pairs_cover_the_truth_and_are_shares(both, only_first, only_second):
+
+
+@cache
+def intervals_of_pairs(
+    both: float, only_first: float, only_second: float
+) -> list[tuple[float, float]]:
+    """Intervals of 200 samples of pairs, drawn with given chances of what is found by whom."""
     chance = np.random.default_rng(4)
-    covered = 0
+    intervals = []
     for n in (2, 5, 20, 100) * 50:
         kinds = chance.choice(
             4, n, p=[both, only_first, only_second, 1.0 - both - only_first - only_second]
         )
         found = paired_share_difference(kinds <= 1, (kinds == 0) | (kinds == 2))
-        low, high = found.interval or (np.nan, np.nan)
-        assert -1.0 <= low < high <= 1.0
-        covered += bool(low <= only_first - only_second <= high)
+        intervals.append(found.interval or (np.nan, np.nan))
+    return intervals
+
+
+@PAIRS
+def test_intervals_of_shares_in_pairs_cover_the_truth(both, only_first, only_second):
+    intervals = intervals_of_pairs(both, only_first, only_second)
+    covered = sum(low <= only_first - only_second <= high for low, high in intervals)
     assert covered / 200 >= 0.92
+
+
+@PAIRS
+def test_intervals_of_shares_in_pairs_are_differences_of_shares(both, only_first, only_second):
+    for low, high in intervals_of_pairs(both, only_first, only_second):
+        assert -1.0 <= low < high <= 1.0
 
 
 def rng(seed: int = 1) -> np.random.Generator:
@@ -395,22 +418,23 @@ class TestDistributions:
 
 
 class TestManagers:
-    def test_the_conclusion_has_scipys_p_and_says_which_is_greater(self):
+    @pytest.mark.parametrize(
+        ("p", "alternative"), [("p_less", "less"), ("p_greater", "greater"), ("p", "two-sided")]
+    )
+    def test_the_conclusion_has_scipys_p(self, p, alternative):
         first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
-        found = mann_whitney(first, second, "asymptotic")
-        for p, each in (
-            (found["p_less"], "less"),
-            (found["p_greater"], "greater"),
-            (found["p"], "two-sided"),
-        ):
-            assert p == pytest.approx(
-                stats.mannwhitneyu(first, second, alternative=each, method="asymptotic").pvalue
-            )
+        expected = stats.mannwhitneyu(
+            first, second, alternative=alternative, method="asymptotic"
+        ).pvalue
+        assert mann_whitney(first, second, "asymptotic")[p] == pytest.approx(expected)
+
+    def test_the_conclusion_says_which_is_greater(self):
+        found = mann_whitney(normal(100, 20, 20, 1), normal(140, 20, 20, 2), "asymptotic")
         assert sign_of(found["p_less"], found["p_greater"]) == -1
         assert sign_of(found["p_greater"], found["p_less"]) == 1
         assert sign_of(0.05, 0.05) == 0
 
-    def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):
+    def test_subsamples_agree_with_a_clear_conclusion_alone(self):
         samples = normal(100, 20, 400, 1), normal(200, 20, 400, 2)
         assert [
             agreement(sign, samples, (20, 20), rng(), subsamples=200) for sign in (1, 0, -1)

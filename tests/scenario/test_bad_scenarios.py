@@ -190,7 +190,7 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
     ],
 )
-def test_a_wrong_scenario_is_refused_with_file_place_and_words(write, content, place, words):
+def test_a_wrong_scenario_is_refused(write, content, place, words):
     error = refused(write, content)
     assert error.file == "mine.yaml"
     assert (error.place or "").startswith(place)
@@ -220,7 +220,7 @@ def test_a_generous_value_is_taken(write, content):
         EVENTS + '"(1,failure,\\n)"\n',
     ],
 )
-def test_line_breaks_and_long_texts_do_not_reach_the_message(write, content):
+def test_a_message_stays_short_whatever_is_given(write, content):
     assert len(str(refused(write, content))) < 400
 
 

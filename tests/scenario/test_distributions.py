@@ -18,8 +18,8 @@ SCENARIO = load_scenario("seams2023")
 NUMBERS = st.floats(-1e6, 1e6)
 
 
-@given(
-    raw=st.fixed_dictionaries(
+DISTRIBUTIONS = (
+    st.fixed_dictionaries(
         {"distribution": st.just("normal"), "mean": NUMBERS, "std": st.floats(0, 1e3)},
         optional={"minimum": NUMBERS, "maximum": NUMBERS},
     )
@@ -32,24 +32,42 @@ NUMBERS = st.floats(-1e6, 1e6)
     )
     | st.fixed_dictionaries(
         {"distribution": st.just("choice"), "values": st.lists(NUMBERS, min_size=1)}
-    ),
-    seed=st.integers(0, 2**32),
+    )
 )
-def test_draws_repeat_and_stay_within_the_bounds(raw, seed):
+
+
+@given(raw=DISTRIBUTIONS, seed=st.integers(0, 2**32))
+def test_draws_stay_within_the_bounds(raw, seed):
     try:
         distribution = ADAPTER.validate_python(raw)
     except ValidationError as error:
         # What is refused has its bounds the wrong way round or far from the mean.
         assert {detail["type"] for detail in error.errors()} == {"wrong"}
         return
-    first, second = random.Random(seed), random.Random(seed)
+    chance = random.Random(seed)
     for _ in range(20):
-        value = draw(distribution, first)
-        assert value == draw(distribution, second)
+        value = draw(distribution, chance)
         assert support(distribution)[0] <= value <= support(distribution)[1]
         assert value <= raw.get("maximum", float("inf"))
         if raw["distribution"] == "choice":
             assert value in raw["values"]
+
+
+@pytest.mark.parametrize(
+    "raw",
+    [
+        {"distribution": "normal", "mean": 1.0, "std": 2.0, "minimum": 0.0},
+        {"distribution": "uniform", "minimum": 1.0, "maximum": 2.0},
+        {"distribution": "exponential", "mean": 3.0},
+        {"distribution": "choice", "values": [1.0, 2.0, 3.0]},
+    ],
+    ids=lambda raw: raw["distribution"],
+)
+def test_draws_repeat(raw):
+    distribution, first, second = ADAPTER.validate_python(raw), random.Random(1), random.Random(1)
+    assert [draw(distribution, first) for _ in range(20)] == [
+        draw(distribution, second) for _ in range(20)
+    ]
 
 
 def test_a_narrow_interval_far_out_is_refused_rather_than_searched_for_ever():
@@ -66,25 +84,31 @@ def drawn_in_run(run: int, values: dict) -> dict[str, float]:
     return Simulator(with_values(SCENARIO, values)).run("none", run, seed=5).drawn
 
 
-def test_keys_of_a_shared_draw_are_shifted_alike_and_others_are_not():
-    def events(**more):
-        uniform = {"distribution": "uniform", **more}
-        first, second = (
-            {**uniform, "minimum": 30, "maximum": 50},
-            {**uniform, "minimum": 55, "maximum": 75},
-        )
-        times = [
-            {"thruster": n + 1, "event": "failure", "time_s": time}
-            for n, time in enumerate((first, second))
-        ]
-        return {"thruster_events": times}
+def two_failures(run: int, **more: str) -> tuple[float, float]:
+    """Draw their times: of the first from 30 to 50 s, of the second 25 s later."""
+    times = [
+        {"distribution": "uniform", "minimum": 30 + by, "maximum": 50 + by, **more}
+        for by in (0, 25)
+    ]
+    events = [
+        {"thruster": number, "event": "failure", "time_s": time}
+        for number, time in enumerate(times, 1)
+    ]
+    drawn = drawn_in_run(run, {"thruster_events": events})
+    return drawn["thruster_events.0.time_s"], drawn["thruster_events.1.time_s"]
 
-    for run in range(1, 6):
-        shared, own = (drawn_in_run(run, events(**more)) for more in ({"shared": "all_events"}, {}))
-        first, second = ("thruster_events.0.time_s", "thruster_events.1.time_s")
-        assert shared[second] - shared[first] == pytest.approx(25, abs=1e-9)
-        assert abs(own[second] - own[first] - 25) > 1e-3
-        assert 30 <= shared[first] <= 50
+
+@pytest.mark.parametrize("run", range(1, 6))
+def test_keys_of_a_shared_draw_are_shifted_alike(run):
+    first, second = two_failures(run, shared="all_events")
+    assert second - first == pytest.approx(25, abs=1e-9)
+    assert 30 <= first <= 50
+
+
+@pytest.mark.parametrize("run", range(1, 6))
+def test_keys_of_draws_of_their_own_are_shifted_otherwise(run):
+    first, second = two_failures(run)
+    assert abs(second - first - 25) > 1e-3
 
 
 def test_an_event_that_is_drawn_before_the_start_is_at_the_start():

@@ -177,7 +177,7 @@ LOW = "low: {ros__parameters: {spiral_altitude: 1}}"
         ("a: {ros__parameters: {type: node}}\n", "line 1", "defines no function"),
     ],
 )
-def test_a_wrong_modes_file_is_refused_with_line_and_words(write, content, place, words):
+def test_a_wrong_modes_file_is_refused(write, content, place, words):
     with pytest.raises(InputError) as caught:
         read_modes(write("m.yaml", content))
     assert str(caught.value).startswith(f"m.yaml: {place}")

@@ -52,7 +52,7 @@ def test_the_schema_accepts_the_shipped_scenarios(validator, name):
         HEAD + "battery: null\n",
     ],
 )
-def test_schema_and_loader_accept_the_same_forms(validator, write, content):
+def test_the_schema_accepts_the_forms_that_the_loader_does(validator, write, content):
     path = write("mine.yaml", content)
     load_scenario(path)
     assert errors(validator, path) == []

@@ -224,7 +224,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize(("name", "change", "manager"), each_pair(sorted(LOADED), CHANGES, DERIVED))
-def test_metacontrol_and_what_is_derived_from_it(name, change, manager):
+def test_managers_derived_from_metacontrol(name, change, manager):
     assert_same_missions(simulator_of(CHANGES[change], name), manager, range(1, 4))
 
 

@@ -3,13 +3,13 @@ where it was left.
 """
 
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import pytest
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoner import Reasoner
-from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.metrics.result import MissionResult
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario, with_values
@@ -108,7 +108,7 @@ def test_after_the_recharge_the_tree_draws_the_vehicle_back_no_more():
     assert x_m[-1] < x_m[0] - 5.0
 
 
-def test_the_level_is_the_knowledge_bases_and_not_the_codes():
+def test_the_level_is_the_knowledge_bases():
     loaded = load_scenario("extended")
     half = with_values(loaded, {"knowledge.values": {"qa_battery_level_work": 0.5}})
     result = Simulator(half).run("metacontrol", run=3, seed=1, record=True)
@@ -152,32 +152,39 @@ def test_the_mission_ends_at_the_first_published_level_that_is_low_enough(distur
     assert ended.metrics.mission_duration_s == pytest.approx(low_s, abs=0.2)
 
 
-@pytest.mark.parametrize(
-    ("design", "level"),
-    [
-        ("fd_recharge", 0.25),
-        ("fd_no_recharge", 0.2),
-        *(
-            pytest.param(*case, marks=pytest.mark.slow)
-            for case in (
-                ("fd_recharge", 1.0),
-                ("fd_recharge", 0.2),
-                ("fd_no_recharge", 1.0),
-                ("fd_no_recharge", 0.25),
-            )
-        ),
-    ],
-)
-def test_stock_pellet_infers_the_same_of_the_extended_ontology(level, design):
-    base = Ontology.load([find("suave_extended.owl", "ontology")])
+@cache
+def extended_ontology() -> Ontology:
+    return Ontology.load([find("suave_extended.owl", "ontology")])
+
+
+def inferred(reasoner: str, design: str, level: float) -> Inference:
+    """What a reasoner infers of a design in use at a level of the battery."""
     state = KnowledgeState.of(
         [ObjectiveState("generate_recharge_path")],
         groundings={"generate_recharge_path": design},
         measurements={"battery_level": level},
     )
-    ours, stock = (Reasoner(base, name).analyze(state) for name in ("pellet", "owlready2"))
-    assert ours == stock
-    in_error = design == "fd_no_recharge" and level < 0.25
-    assert (ours.grounding_status("generate_recharge_path") == "IN_ERROR_NFR") is in_error
-    updatable = ours.values("o_generate_recharge_path", "o_updatable")
-    assert (True in updatable) is (design == "fd_recharge" and level >= 0.25)
+    return Reasoner(extended_ontology(), reasoner).analyze(state)
+
+
+AT_LEVELS = pytest.mark.parametrize(
+    ("design", "level"), list(product(["fd_recharge", "fd_no_recharge"], [0.2, 0.25, 1.0]))
+)
+
+
+@AT_LEVELS
+def test_not_to_recharge_is_an_error_at_a_low_level_alone(design, level):
+    status = inferred("pellet", design, level).grounding_status("generate_recharge_path")
+    assert (status == "IN_ERROR_NFR") == (design == "fd_no_recharge" and level < 0.25)
+
+
+@AT_LEVELS
+def test_to_recharge_may_end_once_the_level_is_no_longer_low(design, level):
+    found = inferred("pellet", design, level).values("o_generate_recharge_path", "o_updatable")
+    assert (True in found) == (design == "fd_recharge" and level >= 0.25)
+
+
+@pytest.mark.slow
+@AT_LEVELS
+def test_stock_pellet_infers_the_same_of_the_extended_ontology(design, level):
+    assert inferred("pellet", design, level) == inferred("owlready2", design, level)

@@ -247,9 +247,7 @@ def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_tim
 
 
 @pytest.mark.parametrize("scenario", ["release15", "seams2023"])
-def test_a_recovery_goes_on_over_the_end_of_the_search_in_2023_and_begins_anew_in_15(
-    simulator, scenario
-):
+def test_whether_a_recovery_outlasts_the_search_is_the_revisions(simulator, scenario):
     def mission(failure_s: float) -> MissionResult:
         faults = [{"thruster": 1, "event": "failure", "time_s": failure_s}]
         return simulator(scenario, **NO_ERRORS, thruster_events=faults).run("bt", 1, 1, record=True)

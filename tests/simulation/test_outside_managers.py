@@ -152,7 +152,7 @@ def failure(simulator, tmp_path, monkeypatch):
         ),
     ],
 )
-def test_what_a_manager_raises_names_manager_run_and_time(
+def test_what_a_manager_raises_is_told_with_where_it_was_raised(
     failure, body, cause, earliest_s, latest_s
 ):
     error = failure(body)

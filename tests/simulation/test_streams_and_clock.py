@@ -26,7 +26,7 @@ def draws(streams: Streams, name: str) -> list[float]:
 
 
 @given(st.integers(0, 2**64), st.integers(0, 10**6), names)
-def test_a_stream_depends_on_seed_run_and_name(seed, run, name):
+def test_a_stream_repeats(seed, run, name):
     assert draws(Streams(seed, run), name) == draws(Streams(seed, run), name)
 
 

@@ -41,16 +41,21 @@ def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over
     assert 4.0 * vehicle.state.leg_quarter_s == pytest.approx(time_s, abs=1e-3)
 
 
-def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point():
-    """Where the four parts of the leg meet, way and speed go on; the speed is greatest in the
-    middle.
-    """
+@pytest.fixture(scope="module")
+def speed_m_per_s() -> np.ndarray:
+    """Of the target, at each row of a leg of four parts."""
     vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
     vehicle.command(0.0, *TO_HALF_A_METRE)
     vehicle.fly_to_row(row_at(5.0))
     way_m = vehicle.track[: row_at(5.0), 0]
-    speed_m_per_s = np.diff(way_m) / STEP_S
-    assert np.abs(np.diff(speed_m_per_s)).max() < 0.06  # no more than an acceleration of 1.2 m/s^2
+    return np.diff(way_m) / STEP_S
+
+
+def test_the_target_never_accelerates_by_more_than_1_2_m_per_s2(speed_m_per_s):
+    assert np.abs(np.diff(speed_m_per_s)).max() < 0.06
+
+
+def test_the_target_is_fastest_in_the_middle_of_its_leg(speed_m_per_s):
     assert 1.0 < np.argmax(speed_m_per_s) * STEP_S < 1.8
     assert speed_m_per_s.max() == pytest.approx(0.4, rel=0.15)  # j q^2, with q = 0.63 s
 
