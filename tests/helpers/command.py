@@ -18,6 +18,7 @@ import pytest
 
 import suave_des
 from suave_des.cli.main import main
+from suave_des.imports import _Beside
 from tests.helpers.needed import need
 
 _PACKAGE_PARENT = str(Path(suave_des.__file__).resolve().parents[1])
@@ -75,7 +76,12 @@ def command_here(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]
             status = int(end.code or 0)
         finally:
             sys.path[:] = path
-            sys.meta_path[:] = finders
+            # Others may have been added or changed by libraries that were imported meanwhile.
+            own = [
+                each for each in sys.meta_path if isinstance(each, _Beside) and each not in finders
+            ]
+            for each in own:
+                sys.meta_path.remove(each)
             for name, module in list(sys.modules.items()):
                 if str(getattr(module, "__file__", None) or "").startswith(str(cwd)):
                     del sys.modules[name]

@@ -12,12 +12,12 @@ from pathlib import Path
 import pandas
 import pytest
 
+from suave_des.kb.deciding import kind_of
 from suave_des.kb.knowledge_base import KnowledgeBase
 from suave_des.kb.policy import Policy, _spans, function_table
+from suave_des.kb.reports import component_reports
 from suave_des.kb.scale import Scale
 from suave_des.kb.situations import Situation
-from suave_des.kb.deciding import kind_of
-from suave_des.kb.reports import component_reports
 from suave_des.kb.space import PolicySpace, States
 from suave_des.kb.states import ManagingSettings
 from tests.helpers.knowledge_states import FEWER_NUMBERS

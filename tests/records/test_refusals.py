@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pandas
 import pytest
-from tests.helpers.mission_folders import write_cell
 
 from suave_des import load_scenario
 from suave_des.errors import InputError
@@ -44,6 +43,7 @@ from suave_des.records.store import (
     read_manifest,
     tidy,
 )
+from tests.helpers.mission_folders import write_cell
 
 Given = Callable[[Path], object]
 """Makes something in a folder, and reads it."""
