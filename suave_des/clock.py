@@ -88,7 +88,13 @@ def summed_tick(t_s: float, due_s: float, period_s: float) -> float:
     return due_s
 
 
-def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
+_LAST = simpy.events.EventPriority(2)
+"""Priority of what comes after all else of its time; SimPy's are 0 and 1."""
+
+
+def exactly_at(
+    env: simpy.Environment, t_s: float, priority: simpy.events.EventPriority = simpy.events.NORMAL
+) -> simpy.Event:
     """An event at mission time t itself; a delay added to the current time may miss it by
     rounding.
 
@@ -100,7 +106,7 @@ def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
     event = simpy.Event(env)
     event._ok = True
     event._value = None
-    heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
+    heappush(env._queue, (t_s, priority, next(env._eid), event))
     return event
 
 
@@ -148,7 +154,8 @@ def _stay(t_s: float) -> None:
 
 
 class Alarm:
-    """Calls a function at a mission time; setting it again replaces the pending call.
+    """Calls a function at a mission time, after all else that happens at that time, whether the
+    call was planned long before or just now; setting it again replaces the pending call.
 
     Example:
         >>> alarm = Alarm(env, lambda: print(env.now))
@@ -167,7 +174,9 @@ class Alarm:
         """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has
         passed.
         """
-        event = exactly_at(self._env, t_s) if exactly else until(self._env, t_s)
+        now_s = self._env.now
+        due_s = t_s if exactly else now_s + max(0.0, t_s - now_s)
+        event = exactly_at(self._env, due_s, _LAST)
         self._pending = event
         event.callbacks.append(self._ring)
 
