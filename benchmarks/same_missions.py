@@ -14,7 +14,7 @@ import argparse
 import hashlib
 from collections.abc import Iterator
 
-from suave_des import InputError, load_scenario
+from suave_des import InputError, MissionError, load_scenario
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import is_built_in, manager_names
 from suave_des.resources import shipped_folder
@@ -44,8 +44,8 @@ def digest(simulator: Simulator, manager: str, missions: int, *, record: bool) -
     try:
         for run in range(1, missions + 1):
             found.update(everything(simulator.run(manager, run, SEED, record=record)).encode())
-    except InputError as error:
-        return f"none: {error}".splitlines()[0]
+    except (InputError, MissionError) as error:
+        return f"none: {error}".splitlines()[0].replace(str(shipped_folder("scenarios")), "")
     return found.hexdigest()
 
 
