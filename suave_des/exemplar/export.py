@@ -186,6 +186,10 @@ def _drawn_events(
 def _bounds(drawn: object) -> tuple[float, float] | None:
     """Return the bounds of what a campaign draws; None if it is not uniform."""
     if isinstance(drawn, dict) and drawn["distribution"] == "uniform":
+        lacking = [name for name in ("minimum", "maximum") if name not in drawn]
+        if lacking:
+            remedy = "give both minimum and maximum"
+            raise InputError(f"{shown(drawn)} has no {' and no '.join(lacking)}", remedy=remedy)
         return float(drawn["minimum"]), float(drawn["maximum"])
     return None
 

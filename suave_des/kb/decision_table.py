@@ -14,7 +14,6 @@ from decimal import Decimal
 from functools import cached_property, lru_cache
 from itertools import chain, product, takewhile
 from math import isfinite, prod
-from operator import itemgetter
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -193,7 +192,9 @@ class DecisionTable:
         """
         if len({rule.then for rule in rules}) > 1:
             return False
-        needed = {frozenset(filter(itemgetter(1), rule.others.items())) for rule in rules}
+        needed = {
+            frozenset((name, now) for name, now in rule.others.items() if now) for rule in rules
+        }
         counts = Counter(frozenset(dict(designs)) for designs in needed)
         never = set[str]().union(*(rule.others for rule in rules)).difference(*counts)
         if never and not never.union([function]).isdisjoint(LASTING):
@@ -569,9 +570,11 @@ def _check_overlaps(path: Path, cells: _Cells) -> None:
 def _contradicting(cell: _Cell) -> Iterator[tuple[_Rule, _Rule]]:
     """Pairs of rules that decide a state that they have in common differently."""
     for one, rules in cell.items():
-        wider = set(product({one[0], None}, {one[1], None}))
+        reports, now = one
+        # in an order that does not depend on hashes, as the first contradiction is told
+        wider = dict.fromkeys(product((reports, None), (now, None)))
         if None in one:  # (any, design) and (reports, any) have states in common, too
-            wider |= {each for each in cell if _agree(one, each)}
+            wider |= dict.fromkeys(each for each in cell if _agree(one, each))
         for rule, other in product(
             rules, chain.from_iterable(cell.get(each, ()) for each in wider)
         ):

@@ -486,7 +486,7 @@ class RuleQuestions:
         if not answers:
             known = sorted({rule.name for rule in self.base.rules})
             raise unknown(f"there is no rule {shown(name)}", name, known)
-        return max(answers, key=attrgetter("fires"))
+        return next((answer for answer in answers if answer.fires), answers[0])
 
     def of(
         self, rule: Rule, state: KnowledgeState, start: Binding = MappingProxyType({})
@@ -647,7 +647,10 @@ class RuleQuestions:
                     why = f"its {write_atom(first)} fails: {reason}"
                     words = f"; {other.name} would conclude it, but {why}"
                     found.append((len(failing), other.name, words))
-        return min(found, default=(0, "", ""))[-1]
+        if not found:
+            return ""
+        _, _, words = min(found)
+        return words
 
 
 def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:

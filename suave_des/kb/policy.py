@@ -232,12 +232,15 @@ def function_table(policy: Policy, function: str) -> tuple[Table, int, str]:
     ]
     names = {f"{function}_now": "now", "reports": "components"}
     headings = [names.get(name, name.removesuffix("_now")) for name in down] + attributes[:-1]
-    columns = [*headings, "then"]
-    title = function
     if attributes:
-        columns = [*headings, *(words for _, words in ranges[-1])]
+        across = attributes[-1]
+        outcomes = [words for _, words in ranges[-1]]
         title = f"{function}, by measured {', '.join(attributes)}"
-    across = "".join(attributes[-1:])
+    else:
+        across = ""
+        outcomes = ["then"]
+        title = function
+    columns = [*headings, *outcomes]
     return Table(columns, rows, title, "l" * len(columns)), len(headings), across
 
 

@@ -545,16 +545,14 @@ def _estimated(triples: Sequence[Triple], designs: Iris) -> dict[str, dict[str, 
         if predicate == HAS_VALUE and _is_decimal(value)
     }
     types = {subject: local_name(kind) for subject, kind in rdf.links(triples, IS_QA_TYPE)}
-    links = rdf.links(triples, TOMASYS + "hasQAestimation")
-    given = [(design, value) for design, value in links if value in types]
-    # by quality attribute, and of one the smallest last, which replaces the others
-    given.sort(key=lambda each: (types[each[1]], -numbers.get(each[1], Decimal("inf"))))
     found: dict[str, dict[str, Decimal | None]] = {name: {} for name in designs}
-    for design, value in given:
+    for design, value in rdf.links(triples, TOMASYS + "hasQAestimation"):
         name = local_name(design)
-        if designs.get(name) == design:
-            found[name][types[value]] = numbers.get(value)
-    return found
+        if value in types and designs.get(name) == design:
+            given = (found[name].get(types[value]), numbers.get(value))
+            known = (each for each in given if each is not None)
+            found[name][types[value]] = min(known, default=None)
+    return {name: dict(sorted(values.items())) for name, values in found.items()}
 
 
 def _members(triples: Iterable[Triple], name: str) -> set[str]:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from urllib.parse import urldefrag, urljoin, urlsplit
 from urllib.request import url2pathname
@@ -92,7 +92,9 @@ def collect(given: Sequence[Path]) -> Sources:
             for iri, _ in file.imports:
                 if any(each.importing == file.path and each.iri == iri for each in supplies):
                     continue
-                for source, reason in islice(find(file, iri, files), 1):
+                found = next(find(file, iri, files), None)
+                if found is not None:
+                    source, reason = found
                     supplies.append(Supply(file.path, iri, source.path, reason))
                     _add(files, source)
     _add_mros_if_used(files, supplies)

@@ -350,9 +350,10 @@ def _runs_row(each: TableRow, metric: Metric) -> tuple[str, ...]:
     paired = f"{each['runs_needed_paired']:,}" if each["runs_needed_paired"] else ""
     needed = each["runs_needed_unpaired"]
     unpaired = f"{needed:,}" if needed else "over 10,000,000"
-    half = f"{each['half_width']:.4g} {metric.unit}".strip()
     if metric.name == FOUND:
         half = f"{100 * each['half_width']:g} points"
+    else:
+        half = f"{each['half_width']:.4g} {metric.unit}".strip()
     return _names_of(each), half, paired, unpaired, ratio
 
 

@@ -226,9 +226,12 @@ class _Builder:
         if token.type == "NUMBER":
             if len(token) > MAX_DIGITS:
                 raise self._wrong(token, "a number of too many digits", f"at most {MAX_DIGITS}")
-            kind = DECIMAL if "." in token else XSD + "integer"
             if "e" in token.lower():
                 kind = XSD + "double"
+            elif "." in token:
+                kind = DECIMAL
+            else:
+                kind = XSD + "integer"
             return Lit(str(token), kind)
         text = self._text(token)
         if not more:

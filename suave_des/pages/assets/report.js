@@ -88,15 +88,15 @@ function fade(hex, alpha) {
 
 /** Means over a swept parameter; each point has runs of its own, so their mean has an ordinary interval. */
 function drawSweep() {
-  const name = drawn.swept.find((each) => !state.sweep[each]);
-  byId('sweep-box').hidden = !name;
-  if (!name) return;
+  const swept = drawn.swept.find((each) => !state.sweep[each]);
+  byId('sweep-box').hidden = !swept;
+  if (!swept) return;
   const traces = [];
   for (const [number, rows] of chosen) {
     const { name, color, dash, symbol } = lookOf(number);
     const byValue = new Map();
     for (const row of known(rows, state.metric)) {
-      const [value, run] = [columns[name][row], `${columns.run[row]}|${seedOf(row)}`];
+      const [value, run] = [columns[swept][row], `${columns.run[row]}|${seedOf(row)}`];
       if (!byValue.has(value)) byValue.set(value, new Map());
       const byRun = byValue.get(value);
       byRun.set(run, [...(byRun.get(run) ?? []), ofMetric(row)]);
@@ -111,9 +111,9 @@ function drawSweep() {
       hovertemplate: '%{y:.2f} %{text} at %{x}<extra>%{fullData.name}</extra>', marker: { symbol, size: 7 },
     });
   }
-  const others = drawn.swept.filter((each) => each !== name && !state.sweep[each]);
-  byId('sweep-title').textContent = `Means and 95% intervals over ${name}${others.length ? `, averaged over ${others.join(', ')}` : ''}`;
-  show('sweep', traces, layoutOf(name, titles[state.metric]));
+  const others = drawn.swept.filter((each) => each !== swept && !state.sweep[each]);
+  byId('sweep-title').textContent = `Means and 95% intervals over ${swept}${others.length ? `, averaged over ${others.join(', ')}` : ''}`;
+  show('sweep', traces, layoutOf(swept, titles[state.metric]));
 }
 
 function drawPaired() {
