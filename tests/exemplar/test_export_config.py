@@ -369,3 +369,12 @@ class TestCommand:
 
     def test_makes_one_folder_at_most(self, write, command):
         assert command("export-config", "release15", "--out", "no/where").status == 2
+
+
+def test_a_perturbation_without_its_bounds_is_refused():
+    loaded = load_scenario("seams2023")
+    drawn = {"start.x_m": {"distribution": "uniform", "low": -1.0, "high": 1.0}}
+    campaign = {"managers": ["none"], "runs": 1, "seed": 1, "perturbations": drawn}
+    with pytest.raises(InputError) as refused:
+        export_config(loaded, campaign, "1.5")
+    assert "has no minimum and no maximum" in str(refused.value)
