@@ -154,8 +154,7 @@ def _stay(t_s: float) -> None:
 
 
 class Alarm:
-    """Calls a function at a mission time, after all else that happens at that time, whether the
-    call was planned long before or just now; setting it again replaces the pending call.
+    """Calls a function at a mission time; setting it again replaces the pending call.
 
     Example:
         >>> alarm = Alarm(env, lambda: print(env.now))
@@ -170,13 +169,19 @@ class Alarm:
         self._callback = callback
         self._pending: simpy.Event | None = None
 
-    def set(self, t_s: float, *, exactly: bool = False) -> None:
-        """Call the function at mission time t (see `exactly_at`), or as the next thing now if t has
-        passed.
+    def set(self, t_s: float, *, exactly: bool = False, last: bool = False) -> None:
+        """Call the function at mission time t, or as the next thing now if t has passed.
+
+        Args:
+            t_s: the time.
+            exactly: see `exactly_at`.
+            last: whether the call comes after all else that happens at that time, whenever it was
+                planned.
         """
         now_s = self._env.now
         due_s = t_s if exactly else now_s + max(0.0, t_s - now_s)
-        event = exactly_at(self._env, due_s, _LAST)
+        priority = _LAST if last else simpy.events.NORMAL
+        event = exactly_at(self._env, due_s, priority)
         self._pending = event
         event.callbacks.append(self._ring)
 

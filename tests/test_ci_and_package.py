@@ -74,7 +74,7 @@ def test_ci_says_that_it_is():
 
 def test_ci_runs_the_slow_tests():
     text = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
-    assert re.search(r"^timeout \d+ .venv/bin/pytest -m slow", text, flags=re.MULTILINE)
+    assert re.search(r"^measured timeout \d+ .venv/bin/pytest -m slow", text, flags=re.MULTILINE)
 
 
 def test_versions_are_tried_on_rooms_that_exist():

@@ -27,12 +27,12 @@ from suave_des.results import statistics
 from suave_des.results.comparison import estimate_in
 from suave_des.results.conclusions import difference_claim
 from suave_des.results.groups import (
-    Group,
     chosen_metrics,
     of_managers,
     parts,
 )
 from suave_des.results.horizon import at_horizons, to_horizon
+from suave_des.results.independent import Group
 from suave_des.results.notes import notes_on_metrics, notes_on_missions
 from suave_des.results.statistics import Sample
 from suave_des.tables import Section, Table, TableRow, Written, capital, rows_of

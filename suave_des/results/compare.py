@@ -28,8 +28,9 @@ from suave_des.records.missions import Missions, missions_in
 from suave_des.records.runs import CONDITION
 from suave_des.results import statistics
 from suave_des.results.comparison import Comparison, concluded
-from suave_des.results.groups import Group, Groups, grouped
+from suave_des.results.groups import Groups, grouped
 from suave_des.results.horizon import FOUND_BY_HORIZON, TIMES
+from suave_des.results.independent import Group
 from suave_des.results.statistics import Sample
 from suave_des.tables import Table, TableRow
 

@@ -35,13 +35,13 @@ from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, rea
 from suave_des.records.missions import Missions, read_missions
 from suave_des.results import style
 from suave_des.results.groups import (
-    Group,
     Groups,
     check_swept,
     grouped,
 )
 from suave_des.results.horizon import FOUND_BY_HORIZON, horizons_s, to_horizon
 from suave_des.results.independent import (
+    Group,
     first_run_of_draw,
     independent,
     runs_per_draw,

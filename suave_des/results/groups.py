@@ -21,6 +21,7 @@ from suave_des.records.metrics import (
 from suave_des.records.missions import Missions
 from suave_des.results.horizon import FOUND_BY_HORIZON, HORIZON, at_horizons
 from suave_des.results.independent import (
+    Group,
     conditions_of,
     independent,
     over_conditions,
@@ -32,42 +33,6 @@ from suave_des.tables import printable
 _USUAL = (*PAPER_METRICS, FOUND, REACTION_TIME)
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Missions that are compared with those of other groups.
-
-    Attributes:
-        name: the manager's, with its source or its value of a sweep where several have the same.
-        frame: a row for each independent value: for each mission, or, where points of a sweep are
-            averaged, for each run, whose random numbers all points share; for each draw that
-            several runs share; or for each condition of real missions. Where seed and run are
-            known, they are its index; of conditions, their source and number. Times of search and
-            detection are brought to the horizon.
-        counted: what each row is: "mission", "run", "draw" or "condition".
-        point: the end of the name that tells the value of a sweep; empty if all values are in the
-            group.
-        horizon_s: up to which times of search and detection count; infinite if it is not known.
-    """
-
-    name: str
-    frame: pandas.DataFrame
-    counted: str = "mission"
-    point: str = ""
-    horizon_s: float = math.inf
-
-    @property
-    def is_of_missions(self) -> bool:
-        """Whether each row is one mission."""
-        return self.counted == "mission"
-
-    @property
-    def has_runs(self) -> bool:
-        """Whether seed and run of each row are known, so that it can be paired with those of
-        others.
-        """
-        return self.frame.index.nlevels > 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,49 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import pandas
 
 from suave_des.records.missions import SHARING
 from suave_des.records.runs import CONDITION, NUMBER_COLUMNS
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Missions that are compared with those of other groups.
+
+    Attributes:
+        name: the manager's, with its source or its value of a sweep where several have the same.
+        frame: a row for each independent value: for each mission, or, where points of a sweep are
+            averaged, for each run, whose random numbers all points share; for each draw that
+            several runs share; or for each condition of real missions. Where seed and run are
+            known, they are its index; of conditions, their source and number. Times of search and
+            detection are brought to the horizon.
+        counted: what each row is: "mission", "run", "draw" or "condition".
+        point: the end of the name that tells the value of a sweep; empty if all values are in the
+            group.
+        horizon_s: up to which times of search and detection count; infinite if it is not known.
+    """
+
+    name: str
+    frame: pandas.DataFrame
+    counted: str = "mission"
+    point: str = ""
+    horizon_s: float = math.inf
+
+    @property
+    def is_of_missions(self) -> bool:
+        """Whether each row is one mission."""
+        return self.counted == "mission"
+
+    @property
+    def has_runs(self) -> bool:
+        """Whether seed and run of each row are known, so that it can be paired with those of
+        others.
+        """
+        return self.frame.index.nlevels > 1
 
 
 def runs_per_draw(frame: pandas.DataFrame) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import pandas
 
@@ -12,10 +11,8 @@ from suave_des.records.metrics import FOUND, REACTION_TIME, SEARCH_TIME, Metric
 from suave_des.records.missions import SHARING
 from suave_des.records.runs import CONDITION
 from suave_des.results.horizon import ENDED, FOUND_BY_HORIZON, SAME_LIMIT_S
+from suave_des.results.independent import Group
 from suave_des.tables import listed, printable
-
-if TYPE_CHECKING:
-    from suave_des.results.groups import Group
 
 _MEMBER = "ensemble_member"
 _FEW = 20

@@ -36,6 +36,9 @@ class CallTimes:
         depends_on: the measurements that an event-triggered manager depends on, with its
             thresholds; None: it is called at each of its times.
         reads_for_s: how long after its beginning a call may still read them.
+        is_event_triggered: whether calls of such a manager are left out, if not in this mission.
+            Its calls come after all else of their time: a call that was planned long before finds
+            what one finds that was planned a period before.
     """
 
     def __init__(
@@ -46,9 +49,12 @@ class CallTimes:
         first_s: float,
         depends_on: Sequence[tuple[Measurements, Thresholds]] | None,
         reads_for_s: float = 0.0,
+        *,
+        is_event_triggered: bool = False,
     ) -> None:
         self._env, self.period_s, self._depends_on = env, period_s, depends_on
         self._reads_for_s = reads_for_s
+        self._comes_last = is_event_triggered
         self._next_s = first_s  # the first of its times after the last call
         self._sleeps = False
         self._known: set[tuple[int, ...]] = set()  # regions in which a call has changed nothing
@@ -65,7 +71,8 @@ class CallTimes:
         self._known.clear()
         if self._sleeps:
             self._sleeps = False
-            self._alarm.set(summed_tick(self._env.now, self._next_s, self.period_s))
+            next_s = summed_tick(self._env.now, self._next_s, self.period_s)
+            self._alarm.set(next_s, last=self._comes_last)
 
     def go_on(self, changed: bool, may_sleep: bool) -> None:
         """Plan the next call when one is over.
@@ -86,7 +93,7 @@ class CallTimes:
         if self._depends_on is not None and may_sleep and is_exact and self._is_foreseen():
             self._sleep(self._depends_on, now_s)
         else:
-            self._alarm.set(self._next_s)
+            self._alarm.set(self._next_s, last=self._comes_last)
 
     def _is_foreseen(self) -> bool:
         """Whether no value can be published during a call that is not yet in the tables."""
@@ -107,7 +114,7 @@ class CallTimes:
             regions, until_s = _regions_at(depends_on, call_s)
             if until_s <= call_s + self._reads_for_s:
                 break
-        self._alarm.set(call_s, exactly=True)
+        self._alarm.set(call_s, exactly=True, last=self._comes_last)
 
     def close(self) -> None:
         """Call no more."""

@@ -78,7 +78,14 @@ class ManagerHost:
             depends_on = [
                 (measurements[name], declared[name]) for name in measurements if name in declared
             ]
-        self._times = CallTimes(self.system.env, self._adapt, *times, depends_on, reads_for_s)
+        self._times = CallTimes(
+            self.system.env,
+            self._adapt,
+            *times,
+            depends_on,
+            reads_for_s,
+            is_event_triggered=declared is not None,
+        )
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""

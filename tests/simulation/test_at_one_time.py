@@ -1,5 +1,5 @@
-"""A manager's call comes after all else of its time, so that it does not matter when it was planned:
-calls that are left out, and missions that are recorded, change nothing.
+"""The call of an event-triggered manager comes after all else of its time, so that it does not matter
+when it was planned: calls that are left out, and missions that are recorded, change nothing.
 """
 
 import pytest
@@ -11,14 +11,14 @@ from suave_des.simulation.mission import Mission
 
 
 @pytest.mark.parametrize("planned", ["before", "after"])
-def test_an_alarm_rings_after_all_else_of_its_time(planned):
+def test_the_last_call_of_a_time_comes_after_all_else(planned):
     env, order = simpy.Environment(), []
     alarm = Alarm(env, lambda: order.append("alarm"))
     if planned == "before":
-        alarm.set(4.0)
+        alarm.set(4.0, last=True)
     call_at(env, 4.0, lambda: order.append("other"))
     if planned == "after":
-        alarm.set(4.0)
+        alarm.set(4.0, last=True)
     env.run()
     assert order == ["other", "alarm"]
 
