@@ -182,7 +182,8 @@ def requested_managers(
     """
     runs = dict[str, int]()
     for each in experiments:
-        place, manager = each.place, each.manager
+        place = each.place
+        manager = each.manager
         if manager not in known:
             remedy = did_you_mean(manager, known)
             notes.append(f"{place}: not imported: there is no manager {shown(manager)} ({remedy})")

@@ -192,9 +192,9 @@ class DecisionTable:
         """
         if len({rule.then for rule in rules}) > 1:
             return False
-        needed = {
-            frozenset((name, now) for name, now in rule.others.items() if now) for rule in rules
-        }
+        needed = set()
+        for rule in rules:
+            needed.add(frozenset((name, now) for name, now in rule.others.items() if now))
         counts = Counter(frozenset(dict(designs)) for designs in needed)
         never = set[str]().union(*(rule.others for rule in rules)).difference(*counts)
         if never and not never.union([function]).isdisjoint(LASTING):

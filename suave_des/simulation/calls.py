@@ -32,7 +32,7 @@ class CallTimes:
 
     Args:
         call: the call.
-        period_s, first_s: the manager's times.
+        times: the manager's period and its first time, s.
         depends_on: the measurements that an event-triggered manager depends on, with its
             thresholds; None: it is called at each of its times.
         reads_for_s: how long after its beginning a call may still read them.
@@ -45,14 +45,15 @@ class CallTimes:
         self,
         env: simpy.Environment,
         call: Callable[[], None],
-        period_s: float,
-        first_s: float,
+        times: tuple[float, float],
         depends_on: Sequence[tuple[Measurements, Thresholds]] | None,
         reads_for_s: float = 0.0,
         *,
         is_event_triggered: bool = False,
     ) -> None:
-        self._env, self.period_s, self._depends_on = env, period_s, depends_on
+        self._env = env
+        self._depends_on = depends_on
+        self.period_s, first_s = times
         self._reads_for_s = reads_for_s
         self._comes_last = is_event_triggered
         self._next_s = first_s  # the first of its times after the last call

@@ -81,7 +81,7 @@ class ManagerHost:
         self._times = CallTimes(
             self.system.env,
             self._adapt,
-            *times,
+            times,
             depends_on,
             reads_for_s,
             is_event_triggered=declared is not None,
