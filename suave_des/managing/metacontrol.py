@@ -358,10 +358,15 @@ class Metacontrol(ManagingSubsystem):
         since the cycle began counts as well.
         """
         assert self.period_s is not None  # revisions have metacontrol's
-        env, passed_s = self.system.env, self.system.now_s - self.starts_s
-        began_s = self.starts_s + passed_s // self.period_s * self.period_s
+        env = self.system.env
+        if not self.objectives or env.now < self.starts_s:
+            return
+        # As the cycles' times are summed up: the time names the stream of the cycle's latency.
+        began_s = self.starts_s
+        while began_s + self.period_s <= env.now:
+            began_s += self.period_s
         ends_s = began_s + self._latency_s(began_s)
-        if not self.objectives or passed_s < 0.0 or env.now >= ends_s:
+        if env.now >= ends_s:
             return
         reasoning = self._analyze_and_plan()
         measured_before = self._measured_key()
