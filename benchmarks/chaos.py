@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import suave_des
-from suave_des.records.store import STORE_FILE, Store
+from suave_des.records.store import STORE_FILE, Store, has_campaign
 
 MANAGERS = ("none", "random")
 SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 60}\n"
@@ -86,7 +86,7 @@ def survive_forked(
     """
     done: list[int] = []
     while len(done) < kills:
-        resumes = (out / STORE_FILE).exists()
+        resumes = has_campaign(out)
         here, there = os.pipe()
         child = os.fork()
         if child == 0:
@@ -109,7 +109,7 @@ def survive_forked(
 
 
 def _done(out: Path) -> int:
-    if not (out / STORE_FILE).exists():
+    if not has_campaign(out):
         return 0
     store = Store(out / STORE_FILE)
     try:
@@ -147,7 +147,7 @@ def survive(
         process.kill()
         process.communicate()
         done.append(_done(folder / "out"))
-        if (folder / "out" / STORE_FILE).exists():
+        if has_campaign(folder / "out"):
             arguments = ["--resume", "out", *asked[asked.index("--workers") :]]
     status, err = ended(start(arguments, folder))
     assert status == 0, err

@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks import chaos
 from suave_des.campaign.campaign import run_campaign
+from suave_des.records.store import STORE_FILE, Store, has_campaign
 
 FILES = ("runs.csv", "summary.csv", "manifest.json")
 OF_PYTHON_ITSELF = ("in _get_module_details", "Could not import runpy module")
@@ -32,7 +33,7 @@ def test_a_campaign_that_is_stopped_many_times_has_the_same_bytes(tmp_path, numb
         assert "Traceback" not in told or is_starting
         again = (
             ["--resume", "killed"]
-            if (tmp_path / "killed" / "campaign.sqlite").is_file()
+            if has_campaign(tmp_path / "killed")
             else [*arguments, "--out", "killed"]
         )
         process = chaos.start(again, tmp_path)
@@ -40,6 +41,19 @@ def test_a_campaign_that_is_stopped_many_times_has_the_same_bytes(tmp_path, numb
     assert status == 0, told
     for name in FILES[:2]:
         assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+@pytest.mark.parametrize("is_made", [True, False], ids=["no table yet", "an empty file"])
+def test_one_that_was_killed_before_its_store_had_begun_is_run_as_if_it_had_never_been(
+    tmp_path, is_made
+):
+    (tmp_path / "short.yaml").write_text(chaos.SHORT)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / STORE_FILE).write_bytes(b"")
+    if is_made:
+        Store(tmp_path / "out" / STORE_FILE)._db.close()
+    run_campaign(tmp_path / "short.yaml", ["none"], 2, 1, out=tmp_path / "out")
+    assert len((tmp_path / "out" / "runs.csv").read_text().splitlines()) == 1 + 2
 
 
 @pytest.mark.slow
@@ -63,7 +77,7 @@ def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one
         process.kill()
         chaos.ended(process)
         runs = tmp_path / "out" / "runs.csv"
-        if runs.is_file() and (tmp_path / "out" / "campaign.sqlite").is_file():
+        if runs.is_file() and has_campaign(tmp_path / "out"):
             managers = {line.split(",")[1] for line in runs.read_text().splitlines()[1:]}
             resumed = chaos.start(["--resume", "out"], tmp_path)
             status, error = chaos.ended(resumed)
