@@ -9,7 +9,7 @@ the design's name. Source of what revisions do differently: kas-lab/suave with i
 
 from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final, Protocol
+from typing import ClassVar, Final, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
 from suave_des.clock import call_at, call_next, tick_at_or_after
@@ -68,6 +68,20 @@ class LoopSettings:
     period_s: float | None
     latency_s: AnyDistribution
     forgets_recovered: bool = True
+
+
+class Cycle(NamedTuple):
+    """A cycle of the loop that has inferred and planned something.
+
+    Attributes:
+        reasoning: what it has inferred and planned.
+        is_idle: whether executing the plan would change nothing, and record nothing.
+        measured: what can be distinguished in the values that it began with.
+    """
+
+    reasoning: Reasoning
+    is_idle: bool
+    measured: Hashable
 
 
 _cached: WeakKeyDictionary[Decider, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
@@ -133,7 +147,7 @@ class Metacontrol(ManagingSubsystem):
             else frozenset[str]()
         )
         self._awaited = expected.intersection(system.measurements, scenario.signals)
-        self.reads_for_s = support(settings.latency_s)[1]
+        self.reads_for_s = self._longest_latency_s = support(settings.latency_s)[1]
         self.period_s = settings.period_s
         if self.period_s is not None:
             self.starts_s = self.first_cycle_s(self.period_s)
@@ -165,15 +179,33 @@ class Metacontrol(ManagingSubsystem):
     def adapt(self) -> AdaptationProcess | None:
         """Go through the loop once."""
         self.monitor()
-        if not self.objectives or not self._awaited <= self.measurements.keys():
+        cycle = self._cycle()
+        if cycle is None:
             return None
         self._cancelled.clear()
-        reasoning = self._analyze_and_plan()
         if self.system.recorded and self.needs_knowledge:
-            self.system.log_state(reasoning.inference.state)
-        if self._changes_nothing(reasoning) and not reasoning.plan.decisions:
+            self.system.log_state(cycle.reasoning.inference.state)
+        if not self._is_planned_anew(cycle):
             return None
-        return self.execute(reasoning, self._latency_s(self.system.now_s))
+        return self.execute(cycle, self._latency_s(self.system.now_s))
+
+    def _cycle(self) -> Cycle | None:
+        """What a cycle infers and plans that begins now; None: it waits for objectives, or for
+        values.
+        """
+        self.reads_for_s = 0.0
+        if not self.objectives or not self._awaited <= self.measurements.keys():
+            return None
+        measured = self._measured_key()
+        reasoning = self._analyze_and_plan(measured)
+        cycle = Cycle(reasoning, self._changes_nothing(reasoning), measured)
+        if self._is_planned_anew(cycle):
+            self.reads_for_s = self._longest_latency_s
+        return cycle
+
+    def _is_planned_anew(self, cycle: Cycle) -> bool:
+        """Whether a cycle goes on after the reasoner's latency, with the values of then."""
+        return not cycle.is_idle or bool(cycle.reasoning.plan.decisions)
 
     def _latency_s(self, began_s: float) -> float:
         """Draw how long the cycle that began at a mission time takes to infer."""
@@ -211,26 +243,24 @@ class Metacontrol(ManagingSubsystem):
         """Choose function designs for the objectives that need a different one."""
         return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
-    def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
+    def execute(self, cycle: Cycle, latency_s: float) -> AdaptationProcess:
         """Plan anew after the reasoner's latency, and request the plan's modes; return whether
         another cycle would change nothing.
         """
-        began_s = self.system.now_s
+        began_s, planned = self.system.now_s, cycle.reasoning.plan
         recovered = self._to_be_forgotten()
-        was_idle = self._changes_nothing(reasoning)
-        measured_before = self._measured_key()
         yield self.system.env.timeout(latency_s)
-        by_now = self._plan_by_now(reasoning, measured_before)
-        if self.system.recorded and self.needs_knowledge and reasoning.plan.decisions:
+        self.monitor()
+        by_now = self._plan_by_now(cycle.reasoning, cycle.measured)
+        if self.system.recorded and self.needs_knowledge and planned.decisions:
             self.system.log_state(by_now.inference.state, began_s)
-        plan = by_now.plan
-        if not was_idle or plan.designs != reasoning.plan.designs:
-            self._log_statuses(reasoning.inference)
-            self._carry_out(plan, recovered, latency_s)
+        if not cycle.is_idle or by_now.plan.designs != planned.designs:
+            self._log_statuses(cycle.reasoning.inference)
+            self._carry_out(by_now.plan, recovered, latency_s)
         if not self._is_event_triggered:
             return False
-        self.monitor()
-        return not self.objectives or self._changes_nothing(self._analyze_and_plan())
+        another = self._cycle()
+        return another is None or another.is_idle
 
     def _log_statuses(self, inference: Inference) -> None:
         if self.system.recorded:
@@ -368,10 +398,11 @@ class Metacontrol(ManagingSubsystem):
         ends_s = began_s + self._latency_s(began_s)
         if env.now >= ends_s:
             return
-        reasoning = self._analyze_and_plan()
         measured_before = self._measured_key()
+        reasoning = self._analyze_and_plan(measured_before)
 
         def execute() -> None:
+            self.monitor()
             for decision in self._plan_by_now(reasoning, measured_before).plan.decisions:
                 if decision.function in functions and decision.design is not None:
                     self.system.change_mode(decision.function, decision.design)
@@ -399,9 +430,13 @@ class Metacontrol(ManagingSubsystem):
             return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, thresholds)
 
-    def _analyze_and_plan(self) -> Reasoning:
-        """Analyze and plan, or look up the cached result for an equal state."""
-        state = self._symbolic_state()
+    def _analyze_and_plan(self, measured: Hashable) -> Reasoning:
+        """Analyze and plan, or look up the cached result for an equal state.
+
+        Args:
+            measured: what can be distinguished in the measured values.
+        """
+        state = self._known(), measured
         reasoning = self._reasonings.get(state)
         if reasoning is None:
             inference = self.analyze()
@@ -413,7 +448,6 @@ class Metacontrol(ManagingSubsystem):
         """Choose designs with the values that are measured now, after the reasoner has inferred
         something of those before.
         """
-        self.monitor()
         measured_now = self._measured_key()
         if measured_now == measured_before or not self._plans_by_now:
             return reasoning
@@ -434,14 +468,13 @@ class Metacontrol(ManagingSubsystem):
                 self._reasonings.clear()
             self._reasonings[key] = reasoning
 
-    def _symbolic_state(self) -> Hashable:
-        """Make the key of the state."""
-        known = (
+    def _known(self) -> Hashable:
+        """Make the key of the state but for measured values."""
+        return (
             tuple(self.objectives.items()),
             tuple(self.groundings.items()),
             tuple(self.components.items()),
         )
-        return known, self._measured_key()
 
     def _measured_key(self) -> Hashable:
         """Make the key of the measured values: their regions, or, if the mission is recorded or what
@@ -456,7 +489,7 @@ class Metacontrol(ManagingSubsystem):
         """Return whether executing a plan would change nothing, and record nothing."""
         # A latency of a period or more must pass even so: cycles that come due meanwhile are
         # skipped.
-        is_late = self.period_s is not None and self.reads_for_s >= self.period_s
+        is_late = self.period_s is not None and self._longest_latency_s >= self.period_s
         if is_late or self._to_be_forgotten():
             return False
         if self.system.recorded:

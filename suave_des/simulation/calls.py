@@ -20,6 +20,11 @@ _MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
 _ROUNDING_S = 1e-9
 
+_DependsOn = Sequence[tuple[Measurements, Thresholds]]
+"""Measurements, with the thresholds between which their regions lie."""
+_Regions = tuple[int, ...]
+"""The region in which each measured value is."""
+
 
 class CallTimes:
     """Calls a manager at its times: once a period, or, if it is event-triggered, only at those at
@@ -35,7 +40,8 @@ class CallTimes:
         times: the manager's period and its first time, s.
         depends_on: the measurements that an event-triggered manager depends on, with its
             thresholds; None: it is called at each of its times.
-        reads_for_s: how long after its beginning a call may still read them.
+        reads_for_s: returns for how long after its beginning another call in the present state
+            would still read them.
         is_event_triggered: whether calls of such a manager are left out, if not in this mission.
             Its calls come after all else of their time: a call that was planned long before finds
             what one finds that was planned a period before.
@@ -46,8 +52,8 @@ class CallTimes:
         env: simpy.Environment,
         call: Callable[[], None],
         times: tuple[float, float],
-        depends_on: Sequence[tuple[Measurements, Thresholds]] | None,
-        reads_for_s: float = 0.0,
+        depends_on: _DependsOn | None,
+        reads_for_s: Callable[[], float] = lambda: 0.0,
         *,
         is_event_triggered: bool = False,
     ) -> None:
@@ -58,7 +64,8 @@ class CallTimes:
         self._comes_last = is_event_triggered
         self._next_s = first_s  # the first of its times after the last call
         self._sleeps = False
-        self._known: set[tuple[int, ...]] = set()  # regions in which a call has changed nothing
+        # Regions in which a call has changed nothing, and for how long another one would read.
+        self._known: dict[_Regions, float] = {}
         self._call = call
         self._alarm = Alarm(env, self._ring)
         self._alarm.set(first_s)
@@ -91,29 +98,31 @@ class CallTimes:
         # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
         # nothing is lost.
         is_exact = now_s >= self.period_s
-        if self._depends_on is not None and may_sleep and is_exact and self._is_foreseen():
-            self._sleep(self._depends_on, now_s)
+        if self._depends_on is None or not may_sleep or not is_exact:
+            self._alarm.set(self._next_s, last=self._comes_last)
+            return
+        regions, until_s = _regions_at(self._depends_on, now_s)
+        self._known[regions] = self._reads_for_s()
+        if self._is_foreseen(self._depends_on):
+            self._sleep(self._depends_on, regions, until_s)
         else:
             self._alarm.set(self._next_s, last=self._comes_last)
 
-    def _is_foreseen(self) -> bool:
+    def _is_foreseen(self, depends_on: _DependsOn) -> bool:
         """Whether no value can be published during a call that is not yet in the tables."""
-        depends_on = self._depends_on or ()
-        return self._reads_for_s == 0.0 or not any(each.may_change for each, _ in depends_on)
+        return not any(each.may_change for each, _ in depends_on) or not any(self._known.values())
 
-    def _sleep(self, depends_on: Sequence[tuple[Measurements, Thresholds]], now_s: float) -> None:
+    def _sleep(self, depends_on: _DependsOn, regions: _Regions, until_s: float) -> None:
         self._sleeps, earliest_s = True, self._next_s
-        regions, until_s = _regions_at(depends_on, now_s)
-        self._known.add(regions)
         while regions in self._known:
             if until_s == inf:
                 return
-            # A call at any earlier time would be over before the values leave their regions.
-            read_from_s = until_s - self._reads_for_s - _ROUNDING_S
+            # A call at any earlier time would have read before the values leave their regions.
+            read_from_s = until_s - self._known[regions] - _ROUNDING_S
             call_s = summed_tick(read_from_s, earliest_s, self.period_s)
             earliest_s = call_s + self.period_s
             regions, until_s = _regions_at(depends_on, call_s)
-            if until_s <= call_s + self._reads_for_s:
+            if until_s <= call_s + self._known.get(regions, 0.0):
                 break
         self._alarm.set(call_s, exactly=True, last=self._comes_last)
 
@@ -123,9 +132,7 @@ class CallTimes:
         del self._alarm
 
 
-def _regions_at(
-    depends_on: Sequence[tuple[Measurements, Thresholds]], t_s: float
-) -> tuple[tuple[int, ...], float]:
+def _regions_at(depends_on: _DependsOn, t_s: float) -> tuple[_Regions, float]:
     """Find the regions of measured values at mission time t, and until when they stay the same."""
     regions, until_s = [], inf
     for measured, thresholds in depends_on:

@@ -63,7 +63,8 @@ class ManagerHost:
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
-            reads_for_s = reading_time_of(self.manager)
+            reads_for_s = partial(reading_time_of, self.manager)
+            reads_for_s()  # which checks it
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:

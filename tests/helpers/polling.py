@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from heapq import heappush
 from itertools import product
@@ -171,7 +171,7 @@ def begin(self: Flight, detector: Any, search: GenerateSearchPath, follow: Follo
     look(0)
 
 
-def analyze_and_plan_anew(self: Metacontrol) -> Reasoning:
+def analyze_and_plan_anew(self: Metacontrol, measured: Hashable) -> Reasoning:
     """Go through analyze and plan, without looking up the result for an equal state."""
     inference = self.analyze()
     return Reasoning(inference, self.plan(inference))
