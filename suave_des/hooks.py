@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
-from itertools import chain
+from functools import lru_cache
 from math import inf, isnan
 from numbers import Real
 
@@ -121,7 +121,7 @@ def reading_time_of(manager: ManagingSubsystem) -> float:
         ValueError: it is no such time.
     """
     reads_for_s = manager.reads_for_s
-    if isinstance(reads_for_s, Real) and reads_for_s >= 0.0:
+    if isinstance(reads_for_s, (float, Real)) and reads_for_s >= 0.0:
         return float(reads_for_s)
     raise ValueError(f"reads_for_s is {shown(reads_for_s)}; it must be a number of at least 0")
 
@@ -138,20 +138,30 @@ def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
         return None
     known = measured_somewhere(manager.system)
     with suppress(AttributeError, TypeError, ValueError):
-        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        if found.keys() <= set(known) and not any(map(isnan, chain(*found.values()))):
+        found = {name: _thresholds(tuple(each)) for name, each in declared.items()}
+        if found.keys() <= known:
             return found
     form = f"{{'{domain.WATER_VISIBILITY}': (2.25, 3.25)}}"
+    names = ", ".join(sorted(known))
     raise ValueError(
-        f"depends_on is {shown(declared)}; it must be like {form}, of {', '.join(known)}, or None"
+        f"depends_on is {shown(declared)}; it must be like {form}, of {names}, or None"
     )
 
 
-def measured_somewhere(system: System) -> list[str]:
-    """List what is measured, here or in some shipped scenario: a manager may be written for all of
+@lru_cache(maxsize=64)
+def _thresholds(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """Put thresholds into ascending order; a ValueError if one is no number."""
+    found = tuple(sorted(float(each) for each in numbers))
+    if any(map(isnan, found)):
+        raise ValueError
+    return found
+
+
+def measured_somewhere(system: System) -> set[str]:
+    """What is measured, here or in some shipped scenario: a manager may be written for all of
     them.
     """
-    return sorted({*system.measurements, domain.WATER_VISIBILITY, domain.BATTERY_LEVEL})
+    return {*system.measurements, domain.WATER_VISIBILITY, domain.BATTERY_LEVEL}
 
 
 def names_in(kind: type) -> set[str]:

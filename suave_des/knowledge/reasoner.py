@@ -476,6 +476,8 @@ class Reasoner:
             self._disk = SharedEntries(place, digest)
             for kept, found in self._disk.read():
                 self._known[kept] = frozenset(_read_fact(*fact) for fact in found)
+        # Missions measure the same values again and again.
+        self._distinguished = lru_cache(maxsize=4096)(partial(_distinguished, self.regions))
 
     def analyze(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Inference:
         """Infer what the rules say about a state, in which further facts may be asserted.
@@ -562,10 +564,7 @@ class Reasoner:
         """What the rules can distinguish in measured values: the bounds of their regions, or the
         values themselves.
         """
-        if self.regions is None or not all(map(isfinite, measured)):
-            return tuple(measured)
-        bounds = tuple(map(self.regions.around, measured))
-        return bounds if len(set(bounds)) == len(bounds) else tuple(measured)
+        return self._distinguished(tuple(measured))
 
     @cached_property
     def expected_attributes(self) -> frozenset[str]:
@@ -573,6 +572,13 @@ class Reasoner:
         base = self.base
         designs = chain.from_iterable(map(base.designs, base.functions))
         return frozenset(chain.from_iterable(map(base.expected, designs)))
+
+
+def _distinguished(regions: Regions | None, values: tuple[float, ...]) -> Hashable:
+    if regions is None or not all(map(isfinite, values)):
+        return values
+    bounds = tuple(map(regions.around, values))
+    return bounds if len(set(bounds)) == len(bounds) else values
 
 
 def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:

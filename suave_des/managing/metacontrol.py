@@ -70,18 +70,30 @@ class LoopSettings:
     forgets_recovered: bool = True
 
 
+class StateKey(NamedTuple):
+    """What can be distinguished in a state.
+
+    Attributes:
+        known: objectives, groundings and components.
+        measured: the regions of the measured values, or the values.
+    """
+
+    known: Hashable
+    measured: Hashable
+
+
 class Cycle(NamedTuple):
     """A cycle of the loop that has inferred and planned something.
 
     Attributes:
+        began_with: what can be distinguished in the state that it began with.
         reasoning: what it has inferred and planned.
         is_idle: whether executing the plan would change nothing, and record nothing.
-        measured: what can be distinguished in the values that it began with.
     """
 
+    began_with: StateKey
     reasoning: Reasoning
     is_idle: bool
-    measured: Hashable
 
 
 _cached: WeakKeyDictionary[Decider, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
@@ -196,9 +208,9 @@ class Metacontrol(ManagingSubsystem):
         self.reads_for_s = 0.0
         if not self.objectives or not self._awaited <= self.measurements.keys():
             return None
-        measured = self._measured_key()
-        reasoning = self._analyze_and_plan(measured)
-        cycle = Cycle(reasoning, self._changes_nothing(reasoning), measured)
+        key = self._state_key()
+        reasoning = self._analyze_and_plan(key)
+        cycle = Cycle(key, reasoning, self._changes_nothing(reasoning))
         if self._is_planned_anew(cycle):
             self.reads_for_s = self._longest_latency_s
         return cycle
@@ -251,7 +263,7 @@ class Metacontrol(ManagingSubsystem):
         recovered = self._to_be_forgotten()
         yield self.system.env.timeout(latency_s)
         self.monitor()
-        by_now = self._plan_by_now(cycle.reasoning, cycle.measured)
+        by_now = self._plan_by_now(cycle.began_with, cycle.reasoning)
         if self.system.recorded and self.needs_knowledge and planned.decisions:
             self.system.log_state(by_now.inference.state, began_s)
         if not cycle.is_idle or by_now.plan.designs != planned.designs:
@@ -398,12 +410,12 @@ class Metacontrol(ManagingSubsystem):
         ends_s = began_s + self._latency_s(began_s)
         if env.now >= ends_s:
             return
-        measured_before = self._measured_key()
-        reasoning = self._analyze_and_plan(measured_before)
+        key = self._state_key()
+        reasoning = self._analyze_and_plan(key)
 
         def execute() -> None:
             self.monitor()
-            for decision in self._plan_by_now(reasoning, measured_before).plan.decisions:
+            for decision in self._plan_by_now(key, reasoning).plan.decisions:
                 if decision.function in functions and decision.design is not None:
                     self.system.change_mode(decision.function, decision.design)
 
@@ -430,28 +442,23 @@ class Metacontrol(ManagingSubsystem):
             return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, thresholds)
 
-    def _analyze_and_plan(self, measured: Hashable) -> Reasoning:
-        """Analyze and plan, or look up the cached result for an equal state.
-
-        Args:
-            measured: what can be distinguished in the measured values.
-        """
-        state = self._known(), measured
-        reasoning = self._reasonings.get(state)
+    def _analyze_and_plan(self, key: StateKey) -> Reasoning:
+        """Analyze and plan, or look up the cached result for an equal state."""
+        reasoning = self._reasonings.get(key)
         if reasoning is None:
             inference = self.analyze()
             reasoning = Reasoning(inference, self.plan(inference))
-            self._keep(state, reasoning)
+            self._keep(key, reasoning)
         return reasoning
 
-    def _plan_by_now(self, reasoning: Reasoning, measured_before: Hashable) -> Reasoning:
+    def _plan_by_now(self, began_with: StateKey, reasoning: Reasoning) -> Reasoning:
         """Choose designs with the values that are measured now, after the reasoner has inferred
         something of those before.
         """
         measured_now = self._measured_key()
-        if measured_now == measured_before or not self._plans_by_now:
+        if measured_now == began_with.measured or not self._plans_by_now:
             return reasoning
-        key = reasoning.inference.state, measured_now
+        key = began_with, measured_now
         found = self._reasonings.get(key)
         if found is None:
             values = [(name, exact(value)) for name, value in sorted(self.measurements.items())]
@@ -468,13 +475,14 @@ class Metacontrol(ManagingSubsystem):
                 self._reasonings.clear()
             self._reasonings[key] = reasoning
 
-    def _known(self) -> Hashable:
-        """Make the key of the state but for measured values."""
-        return (
+    def _state_key(self) -> StateKey:
+        """Make the key of the state."""
+        known = (
             tuple(self.objectives.items()),
             tuple(self.groundings.items()),
             tuple(self.components.items()),
         )
+        return StateKey(known, self._measured_key())
 
     def _measured_key(self) -> Hashable:
         """Make the key of the measured values: their regions, or, if the mission is recorded or what

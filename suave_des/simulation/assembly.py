@@ -8,7 +8,7 @@ import random
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -237,12 +237,18 @@ def _sender_maker(order: Order, around: Surroundings) -> Callable[[str], SetPoin
     loss_probability = draws.value("revision.set_points.loss_probability")
 
     def make(function: str) -> SetPointSender:
-        keys = [f"revision.set_points.node_frame_offset_{axis}_m/{function}" for axis in "xyz"]
-        offset_m: Point = (draws.value(keys[0]), draws.value(keys[1]), draws.value(keys[2]))
+        x, y, z = _frame_offset_keys(function)
+        offset_m: Point = (draws.value(x), draws.value(y), draws.value(z))
         stream = draws.stream(f"set_points/{function}") if loss_probability else None
         return SetPointSender(around.vehicle, around.env, offset_m, loss_probability, stream)
 
     return make
+
+
+@lru_cache(maxsize=64)
+def _frame_offset_keys(function: str) -> list[str]:
+    """Key paths of how far off a function's frame is in x, y and z."""
+    return [f"revision.set_points.node_frame_offset_{axis}_m/{function}" for axis in "xyz"]
 
 
 def _make_custom_functions(

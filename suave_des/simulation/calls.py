@@ -129,7 +129,7 @@ class CallTimes:
     def close(self) -> None:
         """Call no more."""
         self._alarm.cancel()
-        del self._alarm
+        del self._alarm, self._call
 
 
 def _regions_at(depends_on: _DependsOn, t_s: float) -> tuple[_Regions, float]:

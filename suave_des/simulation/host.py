@@ -104,7 +104,7 @@ class ManagerHost:
         is_own = not author.__module__.startswith("suave_des.")
         if is_own and self.manager.period_s is None and "adapt" not in names_in(author):
             yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
-        known = measured_somewhere(self.system)
+        known = sorted(measured_somewhere(self.system))
         for name in sorted(self.system.unmeasured.difference(known), key=str):
             yield f"measured({shown(name)}) is always None: nothing measures it ({did_you_mean(name, known)})"
 

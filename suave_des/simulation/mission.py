@@ -192,6 +192,9 @@ class Mission:
         # What refers to each other is freed at once if it no longer does: 5% of a mission's time.
         drop_events(self.env)
         self.bus.close()
+        self.mode_manager.listeners.clear()
+        if self._surroundings.battery is not None:
+            self._surroundings.battery.listeners.clear()
         self._managed.flight.close()
         self._coordinator.close()
         self._host.close()
