@@ -259,7 +259,8 @@ class Metacontrol(ManagingSubsystem):
         """Plan anew after the reasoner's latency, and request the plan's modes; return whether
         another cycle would change nothing.
         """
-        began_s, planned = self.system.now_s, cycle.reasoning.plan
+        began_s = self.system.now_s
+        planned = cycle.reasoning.plan
         recovered = self._to_be_forgotten()
         yield self.system.env.timeout(latency_s)
         self.monitor()
