@@ -98,33 +98,42 @@ class CallTimes:
         # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
         # nothing is lost.
         is_exact = now_s >= self.period_s
-        if self._depends_on is None or not may_sleep or not is_exact:
-            self._alarm.set(self._next_s, last=self._comes_last)
-            return
-        regions, until_s = _regions_at(self._depends_on, now_s)
-        self._known[regions] = self._reads_for_s()
-        if self._is_foreseen(self._depends_on):
-            self._sleep(self._depends_on, regions, until_s)
-        else:
-            self._alarm.set(self._next_s, last=self._comes_last)
+        depends_on = self._depends_on
+        if depends_on is not None and may_sleep and is_exact:
+            regions, until_s = _regions_at(depends_on, now_s)
+            self._known[regions] = self._reads_for_s()
+            if self._is_foreseen(depends_on):
+                self._sleeps = True
+                call_s = self._first_different_s(depends_on, regions, until_s)
+                if call_s < inf:
+                    self._alarm.set(call_s, exactly=True, last=self._comes_last)
+                return
+        self._alarm.set(self._next_s, last=self._comes_last)
 
     def _is_foreseen(self, depends_on: _DependsOn) -> bool:
         """Whether no value can be published during a call that is not yet in the tables."""
         return not any(each.may_change for each, _ in depends_on) or not any(self._known.values())
 
-    def _sleep(self, depends_on: _DependsOn, regions: _Regions, until_s: float) -> None:
-        self._sleeps, earliest_s = True, self._next_s
-        while regions in self._known:
-            if until_s == inf:
-                return
-            # A call at any earlier time would have read before the values leave their regions.
+    def _first_different_s(
+        self, depends_on: _DependsOn, regions: _Regions, until_s: float
+    ) -> float:
+        """Find the first of the manager's times at which a call may change something; inf: none is.
+
+        Args:
+            regions: those of now, in which a call changes nothing.
+            until_s: until when the values stay in them.
+        """
+        earliest_s = self._next_s
+        while until_s < inf:
+            # A call before that is over, or has read all it reads, while the values are in them.
             read_from_s = until_s - self._known[regions] - _ROUNDING_S
             call_s = summed_tick(read_from_s, earliest_s, self.period_s)
-            earliest_s = call_s + self.period_s
             regions, until_s = _regions_at(depends_on, call_s)
-            if until_s <= call_s + self._known.get(regions, 0.0):
-                break
-        self._alarm.set(call_s, exactly=True, last=self._comes_last)
+            reads_for_s = self._known.get(regions)
+            if reads_for_s is None or until_s <= call_s + reads_for_s:
+                return call_s
+            earliest_s = call_s + self.period_s
+        return inf
 
     def close(self) -> None:
         """Call no more."""
