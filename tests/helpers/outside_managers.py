@@ -144,6 +144,24 @@ class ReadsLate(EventTriggered):
         return True
 
 
+class ReadsLateInMurkyWater(EventTriggered):
+    """Reads measured values a second after a call begins, but below 3 m only."""
+
+    depends_on: ClassVar = EventTriggered.depends_on
+
+    def adapt(self):
+        super().adapt()
+        is_murky = (self.system.measured("water_visibility") or 0.0) < 3.0
+        self.reads_for_s = 1.0 if is_murky else 0.0
+        return self.read_later() if is_murky else None
+
+    def read_later(self):
+        yield self.system.env.timeout(1.0)
+        is_murky = (self.system.measured("water_visibility") or 0.0) < 3.0
+        self.reads_for_s = 1.0 if is_murky else 0.0
+        return True
+
+
 class SlowInClearWater(EventTriggered):
     """Takes more than a period, in clear water only."""
 

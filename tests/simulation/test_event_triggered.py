@@ -103,6 +103,17 @@ def test_one_that_reads_values_later_is_called_where_it_would_read_the_new_one(c
     assert called_s(steps(2.5, 3.5, crosses_s), "ReadsLate") == called
 
 
+@pytest.mark.parametrize(
+    ("before_m", "after_m", "called"),
+    [(3.5, 2.5, [33.0]), (2.5, 3.5, [31.0])],
+    ids=["it read nothing later", "it read later"],
+)
+def test_how_long_a_call_reads_may_differ_from_state_to_state(before_m, after_m, called):
+    """The value of 31.5 s comes after the call of 31 s has begun, and before it is over."""
+    values = steps(before_m, after_m, 31.0)
+    assert called_s(values, "ReadsLateInMurkyWater") == called
+
+
 def test_after_a_call_that_took_a_period_or_more_it_is_called_again():
     slow = with_settings("NeverIdle", settled=True, takes_s=3.0)
     called = called_s({**steps(2.5, 2.6, 30.0), **slow}, "NeverIdle")
