@@ -202,8 +202,9 @@ class Metacontrol(ManagingSubsystem):
         return self.execute(cycle, self._latency_s(self.system.now_s))
 
     def _cycle(self) -> Cycle | None:
-        """What a cycle infers and plans that begins now; None: it waits for objectives, or for
-        values.
+        """Find what a cycle infers and plans that begins now, and for how long it reads values.
+
+        None: it waits for objectives, or for values.
         """
         self.reads_for_s = 0.0
         if not self.objectives or not self._awaited <= self.measurements.keys():
