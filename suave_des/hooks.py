@@ -138,7 +138,7 @@ def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
         return None
     known = measured_somewhere(manager.system)
     with suppress(AttributeError, TypeError, ValueError):
-        found = {name: _thresholds(tuple(each)) for name, each in declared.items()}
+        found = {name: _thresholds(tuple(map(float, each))) for name, each in declared.items()}
         if found.keys() <= known:
             return found
     form = f"{{'{domain.WATER_VISIBILITY}': (2.25, 3.25)}}"
@@ -151,10 +151,9 @@ def dependencies_of(manager: ManagingSubsystem) -> Dependencies | None:
 @lru_cache(maxsize=64)
 def _thresholds(numbers: tuple[float, ...]) -> tuple[float, ...]:
     """Put thresholds into ascending order; a ValueError if one is no number."""
-    found = tuple(sorted(float(each) for each in numbers))
-    if any(map(isnan, found)):
+    if any(map(isnan, numbers)):
         raise ValueError
-    return found
+    return tuple(sorted(numbers))
 
 
 def measured_somewhere(system: System) -> set[str]:

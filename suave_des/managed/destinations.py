@@ -36,16 +36,6 @@ class GenerateRechargePath(ProcessNode):
     level: BatteryMeasurements
     phase_s: float
 
-    def activated(self) -> None:
-        """Start the way to the station."""
-        self.level.may_be_recharged = True
-        super().activated()
-
-    def deactivated(self) -> None:
-        """Interrupt the way to the station."""
-        self.level.may_be_recharged = False
-        super().deactivated()
-
     def activity(self) -> Process:
         """Go to the station, and recharge there."""
         station, z_m = self.station, SEA_BED_Z_M + self.station.approach_altitude_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -62,6 +63,11 @@ class ModeManager:
     def current_mode(self, function: str) -> str | None:
         """Return the last requested mode; None before the first request."""
         return self._requested.get(function)
+
+    def may_be_active(self, function: str) -> bool:
+        """Whether a function is active, or a mode of it has still to take effect."""
+        is_pending = self._effect_due_s.get(function, -math.inf) >= self.env.now
+        return self.nodes[function].active or is_pending
 
     def end_task(self, functions: Iterable[str]) -> None:
         """End the functions' task: mode changes do not count as adaptations until they are in use

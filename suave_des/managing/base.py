@@ -174,8 +174,9 @@ class ManagingSubsystem:
         period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
         reads_for_s: for how long after its beginning a call of `adapt` may still read measured
-            values, of an event-triggered manager. It may differ from state to state: it is looked
-            up after a call, about another one right then.
+            values, of an event-triggered manager. It may differ from state to state: after a call
+            it says for how long another one that began then would read them. With a period or
+            more it is called at each of its times.
         reasoning_time_s: mission time that reasoning took before adaptations; a further metric.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the
             first one, and a reasoner runs beside the simulator, which slows it down

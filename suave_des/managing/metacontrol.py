@@ -9,6 +9,7 @@ the design's name. Source of what revisions do differently: kas-lab/suave with i
 
 from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
+from math import inf
 from typing import ClassVar, Final, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
@@ -70,30 +71,23 @@ class LoopSettings:
     forgets_recovered: bool = True
 
 
+class MeasuredKey(NamedTuple):
+    """What can be distinguished in measured values.
+
+    Attributes:
+        names: the quality attributes.
+        distinguished: the regions of the values, or the values.
+    """
+
+    names: tuple[str, ...]
+    distinguished: Hashable
+
+
 class StateKey(NamedTuple):
-    """What can be distinguished in a state.
+    """What can be distinguished in a state; `reported` is objectives, groundings and components."""
 
-    Attributes:
-        known: objectives, groundings and components.
-        measured: the regions of the measured values, or the values.
-    """
-
-    known: Hashable
-    measured: Hashable
-
-
-class Cycle(NamedTuple):
-    """A cycle of the loop that has inferred and planned something.
-
-    Attributes:
-        began_with: what can be distinguished in the state that it began with.
-        reasoning: what it has inferred and planned.
-        is_idle: whether executing the plan would change nothing, and record nothing.
-    """
-
-    began_with: StateKey
-    reasoning: Reasoning
-    is_idle: bool
+    reported: Hashable
+    measured: MeasuredKey
 
 
 _cached: WeakKeyDictionary[Decider, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
@@ -191,34 +185,49 @@ class Metacontrol(ManagingSubsystem):
     def adapt(self) -> AdaptationProcess | None:
         """Go through the loop once."""
         self.monitor()
-        cycle = self._cycle()
-        if cycle is None:
+        reasoning = self._infer_and_plan()
+        if reasoning is None:
             return None
         self._cancelled.clear()
         if self.system.recorded and self.needs_knowledge:
-            self.system.log_state(cycle.reasoning.inference.state)
-        if not self._is_planned_anew(cycle):
+            self.system.log_state(reasoning.inference.state)
+        if not self._plans_again_later(reasoning):
             return None
-        return self.execute(cycle, self._latency_s(self.system.now_s))
+        return self.execute(reasoning, self._latency_s(self.system.now_s))
 
-    def _cycle(self) -> Cycle | None:
-        """Find what a cycle infers and plans that begins now, and for how long it reads values.
+    def _infer_and_plan(self) -> Reasoning | None:
+        """Infer and plan by the state of now, and note for how long a cycle that begins now reads
+        values.
 
-        None: it waits for objectives, or for values.
+        Returns:
+            None: the cycle waits for objectives, or for values.
         """
-        self.reads_for_s = 0.0
         if not self.objectives or not self._awaited <= self.measurements.keys():
+            self._note_reading_time(0.0)
             return None
         key = self._state_key()
         reasoning = self._analyze_and_plan(key)
-        cycle = Cycle(key, reasoning, self._changes_nothing(reasoning))
-        if self._is_planned_anew(cycle):
-            self.reads_for_s = self._longest_latency_s
-        return cycle
+        if self.measurements and key.measured.distinguished == tuple(self.measurements.values()):
+            # Any other value is another state, though it is in the same region.
+            self._note_reading_time(inf)
+        elif self._plans_again_later(reasoning):
+            self._note_reading_time(self._longest_latency_s)
+        else:
+            self._note_reading_time(0.0)
+        return reasoning
 
-    def _is_planned_anew(self, cycle: Cycle) -> bool:
-        """Whether a cycle goes on after the reasoner's latency, with the values of then."""
-        return not cycle.is_idle or bool(cycle.reasoning.plan.decisions)
+    def _note_reading_time(self, reads_for_s: float) -> None:
+        # A derived class with an `adapt` of its own may read for longer than the loop.
+        if type(self).adapt is Metacontrol.adapt:
+            self.reads_for_s = reads_for_s
+
+    def _plans_again_later(self, reasoning: Reasoning) -> bool:
+        """Whether a cycle goes on after the reasoner's latency, and plans by the values of then.
+
+        They choose the designs; which objectives get one is inferred of the values at the cycle's
+        beginning, so that a cycle without decisions is over.
+        """
+        return bool(reasoning.plan.decisions) or not self._changes_nothing(reasoning)
 
     def _latency_s(self, began_s: float) -> float:
         """Draw how long the cycle that began at a mission time takes to infer."""
@@ -256,25 +265,25 @@ class Metacontrol(ManagingSubsystem):
         """Choose function designs for the objectives that need a different one."""
         return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
-    def execute(self, cycle: Cycle, latency_s: float) -> AdaptationProcess:
-        """Plan anew after the reasoner's latency, and request the plan's modes; return whether
-        another cycle would change nothing.
+    def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
+        """Plan again after the reasoner's latency, by the values of then, and request the plan's
+        modes; return whether another cycle would change nothing.
         """
-        began_s = self.system.now_s
-        planned = cycle.reasoning.plan
+        began_s, began_with = self.system.now_s, self._state_key()
         recovered = self._to_be_forgotten()
+        was_idle = self._changes_nothing(reasoning)
         yield self.system.env.timeout(latency_s)
         self.monitor()
-        by_now = self._plan_by_now(cycle.began_with, cycle.reasoning)
-        if self.system.recorded and self.needs_knowledge and planned.decisions:
+        by_now = self._plan_by_now(began_with, reasoning)
+        if self.system.recorded and self.needs_knowledge and reasoning.plan.decisions:
             self.system.log_state(by_now.inference.state, began_s)
-        if not cycle.is_idle or by_now.plan.designs != planned.designs:
-            self._log_statuses(cycle.reasoning.inference)
+        if not was_idle or by_now.plan.designs != reasoning.plan.designs:
+            self._log_statuses(reasoning.inference)
             self._carry_out(by_now.plan, recovered, latency_s)
         if not self._is_event_triggered:
             return False
-        another = self._cycle()
-        return another is None or another.is_idle
+        another = self._infer_and_plan()
+        return another is None or self._changes_nothing(another)
 
     def _log_statuses(self, inference: Inference) -> None:
         if self.system.recorded:
@@ -415,13 +424,13 @@ class Metacontrol(ManagingSubsystem):
         key = self._state_key()
         reasoning = self._analyze_and_plan(key)
 
-        def execute() -> None:
+        def carry_out() -> None:
             self.monitor()
             for decision in self._plan_by_now(key, reasoning).plan.decisions:
                 if decision.function in functions and decision.design is not None:
                     self.system.change_mode(decision.function, decision.design)
 
-        call_at(env, ends_s, execute)
+        call_at(env, ends_s, carry_out)
 
     # Queries of the loop.
 
@@ -479,21 +488,21 @@ class Metacontrol(ManagingSubsystem):
 
     def _state_key(self) -> StateKey:
         """Make the key of the state."""
-        known = (
+        reported = (
             tuple(self.objectives.items()),
             tuple(self.groundings.items()),
             tuple(self.components.items()),
         )
-        return StateKey(known, self._measured_key())
+        return StateKey(reported, self._measured_key())
 
-    def _measured_key(self) -> Hashable:
+    def _measured_key(self) -> MeasuredKey:
         """Make the key of the measured values: their regions, or, if the mission is recorded or what
         follows may depend on more, the values.
         """
         measured = self.measurements.values()
         if self.system.recorded or not self._is_cacheable:
-            return tuple(self.measurements), tuple(measured)
-        return tuple(self.measurements), self._reasoner.distinguished(measured)
+            return MeasuredKey(tuple(self.measurements), tuple(measured))
+        return MeasuredKey(tuple(self.measurements), self._reasoner.distinguished(measured))
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""

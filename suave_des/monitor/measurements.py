@@ -216,7 +216,7 @@ class BatteryMeasurements(Measurements):
 
     Attributes:
         recharges: how often it was recharged so far.
-        may_be_recharged: whether the function is active that recharges it.
+        may_be_recharged: says whether the function that recharges it is active, or will be.
         listeners: each is called when it has been recharged.
     """
 
@@ -231,7 +231,7 @@ class BatteryMeasurements(Measurements):
         super().__init__(BATTERY_LEVEL, self.level, timing, [], [], (np.empty(0), np.empty(0)))
         self._discharge_time_s, self._disturbances = discharge_time_s, (noise, is_lost)
         self._full_at_s, self.recharges = 0.0, 0
-        self.may_be_recharged = False
+        self.may_be_recharged: Callable[[], bool] = bool
         self.listeners: list[Callable[[], None]] = []
         periods_s = np.full(timing.count(duration_s) - 1, timing.period_s)
         self._ticks_s: Array = np.add.accumulate(np.append(timing.phase_s, periods_s))
@@ -241,7 +241,7 @@ class BatteryMeasurements(Measurements):
     @property
     def may_change(self) -> bool:
         """Whether it may be recharged."""
-        return self.may_be_recharged
+        return self.may_be_recharged()
 
     def level(self, t_s: float) -> float:
         """Compute the true level at mission time t, if it is not recharged until then."""
@@ -255,6 +255,11 @@ class BatteryMeasurements(Measurements):
         self._measure(np.append(t_s, self._ticks_s[later:]), 1.0)
         for listener in self.listeners:
             listener()
+
+    def close(self) -> None:
+        """Tell and ask nobody any more."""
+        self.listeners.clear()
+        self.may_be_recharged = bool
 
     def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
         """Publish the levels at their times, and that of a recharged battery at once."""

@@ -361,6 +361,8 @@ def _make_host(order: Order, around: Surroundings, managed: Managed) -> ManagerH
     training = prepared.training is not None
     host = ManagerHost(order.manager_type, system, around.bus, around.error_of, learned, training)
     if around.battery is not None:
+        recharge = domain.GENERATE_RECHARGE_PATH
+        around.battery.may_be_recharged = partial(managed.mode_manager.may_be_active, recharge)
         around.battery.listeners.append(host.state_changed)
         managed.mode_manager.listeners.append(lambda *_: host.state_changed())
     return host

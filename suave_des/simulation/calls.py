@@ -40,8 +40,6 @@ class CallTimes:
         times: the manager's period and its first time, s.
         depends_on: the measurements that an event-triggered manager depends on, with its
             thresholds; None: it is called at each of its times.
-        reads_for_s: returns for how long after its beginning another call in the present state
-            would still read them.
         is_event_triggered: whether calls of such a manager are left out, if not in this mission.
             Its calls come after all else of their time: a call that was planned long before finds
             what one finds that was planned a period before.
@@ -53,19 +51,17 @@ class CallTimes:
         call: Callable[[], None],
         times: tuple[float, float],
         depends_on: _DependsOn | None,
-        reads_for_s: Callable[[], float] = lambda: 0.0,
         *,
         is_event_triggered: bool = False,
     ) -> None:
         self._env = env
         self._depends_on = depends_on
         self.period_s, first_s = times
-        self._reads_for_s = reads_for_s
         self._comes_last = is_event_triggered
         self._next_s = first_s  # the first of its times after the last call
         self._sleeps = False
-        # Regions in which a call has changed nothing, and for how long another one would read.
-        self._known: dict[_Regions, float] = {}
+        # Regions in which a call has changed nothing, and for how long one in them reads values.
+        self._idle: dict[_Regions, float] = {}
         self._call = call
         self._alarm = Alarm(env, self._ring)
         self._alarm.set(first_s)
@@ -76,48 +72,52 @@ class CallTimes:
 
     def wake(self) -> None:
         """Note that the manager's state has changed; if it sleeps, it is called at its next time."""
-        self._known.clear()
+        self._idle.clear()
         if self._sleeps:
             self._sleeps = False
             next_s = summed_tick(self._env.now, self._next_s, self.period_s)
             self._alarm.set(next_s, last=self._comes_last)
 
-    def go_on(self, changed: bool, may_sleep: bool) -> None:
+    def go_on(self, changed: bool, may_sleep: bool, reads_for_s: float) -> None:
         """Plan the next call when one is over.
 
         Args:
             changed: whether the call has changed anything.
             may_sleep: whether another one right now would change nothing.
+            reads_for_s: for how long one that began now would read values.
         """
         now_s = self._env.now
         while self._next_s <= now_s:
             self._next_s += self.period_s
         if changed:
-            self._known.clear()
+            self._idle.clear()
         # In the first period now + (t - now) may miss the next time t by rounding, and by another
         # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
         # nothing is lost.
         is_exact = now_s >= self.period_s
+        # A call that takes a period or more is followed by another one later than others are.
+        is_short = reads_for_s < self.period_s - _ROUNDING_S
         depends_on = self._depends_on
-        if depends_on is not None and may_sleep and is_exact:
+        if depends_on is not None and may_sleep and is_exact and is_short:
             regions, until_s = _regions_at(depends_on, now_s)
-            self._known[regions] = self._reads_for_s()
+            self._idle[regions] = reads_for_s
             if self._is_foreseen(depends_on):
                 self._sleeps = True
-                call_s = self._first_different_s(depends_on, regions, until_s)
+                call_s = self._next_needed_s(depends_on, regions, until_s)
                 if call_s < inf:
                     self._alarm.set(call_s, exactly=True, last=self._comes_last)
                 return
         self._alarm.set(self._next_s, last=self._comes_last)
 
     def _is_foreseen(self, depends_on: _DependsOn) -> bool:
-        """Whether no value can be published during a call that is not yet in the tables."""
-        return not any(each.may_change for each, _ in depends_on) or not any(self._known.values())
+        """Whether the tables have all that a left-out call would read: either nothing can be
+        recharged, or no call reads values after its beginning.
+        """
+        return not any(each.may_change for each, _ in depends_on) or not any(self._idle.values())
 
-    def _first_different_s(
-        self, depends_on: _DependsOn, regions: _Regions, until_s: float
-    ) -> float:
-        """Find the first of the manager's times at which a call may change something; inf: none is.
+    def _next_needed_s(self, depends_on: _DependsOn, regions: _Regions, until_s: float) -> float:
+        """Find the first of the manager's times at which a call may change something; inf: there is
+        none.
 
         Args:
             regions: those of now, in which a call changes nothing.
@@ -125,11 +125,11 @@ class CallTimes:
         """
         earliest_s = self._next_s
         while until_s < inf:
-            # A call before that is over, or has read all it reads, while the values are in them.
-            read_from_s = until_s - self._known[regions] - _ROUNDING_S
+            # An earlier call would have read all that it reads before the values leave them.
+            read_from_s = until_s - self._idle[regions] - _ROUNDING_S
             call_s = summed_tick(read_from_s, earliest_s, self.period_s)
             regions, until_s = _regions_at(depends_on, call_s)
-            reads_for_s = self._known.get(regions)
+            reads_for_s = self._idle.get(regions)
             if reads_for_s is None or until_s <= call_s + reads_for_s:
                 return call_s
             earliest_s = call_s + self.period_s
@@ -137,6 +137,7 @@ class CallTimes:
 
     def close(self) -> None:
         """Call no more."""
+        self._sleeps = False
         self._alarm.cancel()
         del self._alarm, self._call
 

@@ -63,8 +63,7 @@ class ManagerHost:
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
-            reads_for_s = partial(reading_time_of, self.manager)
-            reads_for_s()  # which checks it
+            reading_time_of(self.manager)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
@@ -84,7 +83,6 @@ class ManagerHost:
             self._adapt,
             times,
             depends_on,
-            reads_for_s,
             is_event_triggered=declared is not None,
         )
 
@@ -143,7 +141,7 @@ class ManagerHost:
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
             # A call that was refused something would ask again.
-            times.go_on(modes.requests > requests, modes.refusals == refusals)
+            self._go_on(times, modes.requests > requests, modes.refusals == refusals)
         elif isinstance(adaptation, Generator):
             over = partial(self._adapted, times, self.system.env.now)
             AdaptationCall(self.system.env, adaptation, over, self.error_of).resume()
@@ -153,7 +151,10 @@ class ManagerHost:
     def _adapted(self, times: CallTimes, began_s: float, result: object) -> None:
         """Go on after a call of `adapt` that has taken mission time."""
         in_time = self.system.env.now - began_s < times.period_s  # no call was due meanwhile
-        times.go_on(True, in_time and result is True)
+        self._go_on(times, True, in_time and result is True)
+
+    def _go_on(self, times: CallTimes, changed: bool, may_sleep: bool) -> None:
+        times.go_on(changed, may_sleep, self._guarded(reading_time_of, self.manager))
 
     def _guarded(self, hook: Callable[..., _T], *arguments: Any) -> _T:
         try:

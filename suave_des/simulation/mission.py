@@ -194,7 +194,7 @@ class Mission:
         self.bus.close()
         self.mode_manager.listeners.clear()
         if self._surroundings.battery is not None:
-            self._surroundings.battery.listeners.clear()
+            self._surroundings.battery.close()
         self._managed.flight.close()
         self._coordinator.close()
         self._host.close()

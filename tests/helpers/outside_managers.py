@@ -162,6 +162,46 @@ class ReadsLateInMurkyWater(EventTriggered):
         return True
 
 
+class LongInClearWater(EventTriggered):
+    """Sets the search altitude by the values at the end of a call, which is late in clear water."""
+
+    depends_on: ClassVar = {"water_visibility": (3.0,)}
+    subscribes_to = ()
+    reads_for_s = 3.0
+
+    def adapt(self):
+        is_clear = (self.system.measured("water_visibility") or 0.0) >= 3.0
+        yield self.system.env.timeout(3.0 if is_clear else 0.5)
+        is_clear = (self.system.measured("water_visibility") or 0.0) >= 3.0
+        mode = "fd_spiral_high" if is_clear else "fd_spiral_low"
+        self.system.change_mode("f_generate_search_path", mode)
+        return True
+
+
+class SpoilsItsReadingTime(EventTriggered):
+    depends_on: ClassVar = EventTriggered.depends_on
+
+    def adapt(self):
+        self.reads_for_s = -1.0
+
+
+class ThinksFirst(Metacontrol):
+    """Begins each cycle half a second after its call, and says so."""
+
+    depends_on = Metacontrol.depends_on
+
+    def __init__(self, system: System) -> None:
+        super().__init__(system)
+        self.reads_for_s += 0.5
+
+    def adapt(self):
+        yield self.system.env.timeout(0.5)
+        execution = super().adapt()
+        if execution is None:
+            return True
+        return (yield from execution)
+
+
 class SlowInClearWater(EventTriggered):
     """Takes more than a period, in clear water only."""
 

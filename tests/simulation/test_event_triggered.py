@@ -15,6 +15,7 @@ from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.models import ConstantSignal
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import OUTSIDE, outside_managers
+from tests.helpers.owl_text import SUAVE, individual
 from tests.helpers.polling import each_pair, effects
 
 NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
@@ -369,6 +370,113 @@ def test_a_recharge_while_it_reasons_counts_in_the_same_cycle(run):
         effects(simulator, "metacontrol", run, record=record) for record in (True, False)
     )
     assert recorded == not_recorded
+
+
+NEAR_STATION = {
+    "mission.time_limit_s": 60.0,
+    "battery": {
+        "discharge_time_s": 20.0,
+        "docking_check_period_s": 0.5,
+        "publishing_period_s": 0.2,
+        "station_radius_m": 50.0,
+        "station_x_m": -15.0,
+        "station_y_m": 2.0,
+    },
+    "latencies.inference_s": 0.28822482105151315,
+    "latencies.mode_change_s": 1.5,
+    "managers.metacontrol.first_cycle_s": 0.17805074946544747,
+    "managers.metacontrol.reasoning_period_s": 0.5764496421030263,
+    "revision.metacontrol.objectives_at_launch": ["f_generate_search_path"],
+    "signals.water_visibility": {
+        "kind": "sinusoid",
+        "minimum": 0.5205823572189057,
+        "maximum": 2.2463465781480627,
+        "period_s": 54.353575025114,
+        "shift_s": 23.19154738117998,
+        "publishing_period_s": 0.1,
+        "time_step_s": 0.5,
+    },
+    "thruster_monitor.dropout_probability": 0.3,
+    "thruster_events": [{"thruster": 3, "event": "recovery", "time_s": 19.395380225396686}],
+}
+
+
+def test_a_recharge_counts_whose_function_became_active_while_a_call_was_left_out():
+    simulator = Simulator(with_values(load_scenario("extended"), NEAR_STATION))
+    assert_same_missions(simulator, "metacontrol", range(1, 2))
+
+
+def test_a_latency_that_is_a_period_by_rounding_alone_skips_the_next_cycle():
+    values = {
+        "mission.time_limit_s": 90.0,
+        "latencies.inference_s": 1.4999999999999998,
+        "latencies.mode_change_s": 1.5,
+        "managers.metacontrol.reasoning_period_s": 1.5,
+        "signals.water_visibility": {
+            "kind": "step",
+            "before": 3.4642190973512776,
+            "after": 3.592791460715461,
+            "time_s": 37.707848243377676,
+            "time_step_s": 0.0,
+            "noise": {"distribution": "normal", "mean": 0.0, "std": 0.5},
+            "publishing_period_s": 0.25,
+        },
+        "thruster_events": [
+            {"thruster": 5, "event": "failure", "time_s": 35.0},
+            {"thruster": 3, "event": "recovery", "time_s": 63.015098605522454},
+            {"thruster": 4, "event": "recovery", "time_s": 35.0},
+        ],
+    }
+    assert_same_missions(simulator_of(values), "metacontrol", range(2, 3))
+
+
+@pytest.mark.parametrize("shift_s", [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5])
+def test_a_manager_whose_calls_may_take_a_period_is_called_at_each_of_its_times(shift_s):
+    wave = {"kind": "sinusoid", "minimum": 2.0, "maximum": 4.0, "period_s": 37.0}
+    visibility = {**wave, "shift_s": shift_s, "time_step_s": 0.0}
+    values = {"mission.time_limit_s": 90.0, "thruster_events": []}
+    simulator = simulator_of({**values, "signals.water_visibility": visibility})
+    assert_same_missions(simulator, f"{OUTSIDE}:LongInClearWater", range(1, 2))
+
+
+@pytest.mark.parametrize("shift_s", range(0, 80, 10))
+def test_a_loop_that_begins_its_cycles_later_says_for_how_long_it_reads(shift_s):
+    simulator = simulator_of({**NO_FAULTS, "signals.water_visibility.shift_s": float(shift_s)})
+    assert_same_missions(simulator, f"{OUTSIDE}:ThinksFirst", range(1, 2))
+
+
+@pytest.mark.parametrize("record", [True, False])
+def test_a_reading_time_that_is_none_is_told_after_the_call_that_set_it(record):
+    with pytest.raises(MissionError, match=r"SpoilsItsReadingTime.*mission time 1\.00 s.*-1\.0"):
+        called_s(NO_FAULTS, "SpoilsItsReadingTime", record=record)
+
+
+STRONG_CURRENT = (
+    individual("water_current", "QualityAttributeType", ("qa_comparison_operator", ">"))
+    + individual("qa_water_current", "QAvalue", ("isQAtype", ":water_current"), ("hasValue", "9.0"))
+    + f"""<rdf:Description rdf:about="{SUAVE}fd_spiral_high">
+        <tomasys:hasQAestimation rdf:resource="{SUAVE}qa_water_current"/></rdf:Description>"""
+)
+STRONGER_THAN_CLEAR = """Stronger: FunctionGrounding(?fg) ^ typeFD(?fg, ?fd)
+    ^ hasQAvalue(?fg, ?v) ^ isQAtype(?v, water_visibility) ^ hasValue(?v, ?visibility)
+    ^ hasQAvalue(?fg, ?c) ^ isQAtype(?c, water_current) ^ hasValue(?c, ?current)
+    ^ greaterThan(?current, ?visibility) -> fd_realisability(?fd, false)"""
+
+
+def test_a_rule_that_compares_two_measured_values_sees_all_of_them(tmp_path, suave_copy):
+    suave_copy(STRONG_CURRENT)
+    (tmp_path / "stronger.swrl").write_text(STRONGER_THAN_CLEAR)
+    (tmp_path / "current.yaml").write_text("""
+base: seams2023.yaml
+mission: {time_limit_s: 60}
+thruster_events: []
+signals:
+  water_visibility: {kind: constant, value: 3.5}
+  water_current: {kind: step, before: 3.4, after: 3.6, time_s: 40}
+knowledge: {ontologies: [suave.owl], rules: [stronger.swrl]}
+""")
+    simulator = Simulator(load_scenario(tmp_path / "current.yaml"))
+    assert_same_missions(simulator, "metacontrol", range(1, 2))
 
 
 def test_a_class_with_an_analyze_of_its_own_plans_once_with_what_it_inferred_from():
