@@ -269,7 +269,8 @@ class Metacontrol(ManagingSubsystem):
         """Plan again after the reasoner's latency, by the values of then, and request the plan's
         modes; return whether another cycle would change nothing.
         """
-        began_s, began_with = self.system.now_s, self._state_key()
+        began_s = self.system.now_s
+        began_with = self._state_key()
         recovered = self._to_be_forgotten()
         was_idle = self._changes_nothing(reasoning)
         yield self.system.env.timeout(latency_s)
