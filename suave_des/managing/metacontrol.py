@@ -10,7 +10,7 @@ the design's name. Source of what revisions do differently: kas-lab/suave with i
 from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
 from math import inf
-from typing import ClassVar, Final, NamedTuple, Protocol
+from typing import ClassVar, Final, Protocol
 from weakref import WeakKeyDictionary
 
 from suave_des.clock import call_at, call_next, tick_at_or_after
@@ -71,25 +71,10 @@ class LoopSettings:
     forgets_recovered: bool = True
 
 
-class MeasuredKey(NamedTuple):
-    """What can be distinguished in measured values.
-
-    Attributes:
-        names: the quality attributes.
-        distinguished: the regions of the values, or the values.
-    """
-
-    names: tuple[str, ...]
-    distinguished: Hashable
-
-
-class StateKey(NamedTuple):
-    """What can be distinguished in a state; `reported` is objectives, groundings and components."""
-
-    reported: Hashable
-    measured: MeasuredKey
-
-
+_MeasuredKey = tuple[tuple[str, ...], Hashable]
+"""The measured quality attributes, and what can be distinguished in their values: the regions, or
+the values.
+"""
 _cached: WeakKeyDictionary[Decider, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = (
     WeakKeyDictionary()
 )
@@ -191,7 +176,9 @@ class Metacontrol(ManagingSubsystem):
         self._cancelled.clear()
         if self.system.recorded and self.needs_knowledge:
             self.system.log_state(reasoning.inference.state)
-        if not self._plans_again_later(reasoning):
+        # Later values choose designs, but not the objectives that get one: without a decision a
+        # cycle is over.
+        if not reasoning.plan.decisions and self._changes_nothing(reasoning):
             return None
         return self.execute(reasoning, self._latency_s(self.system.now_s))
 
@@ -205,12 +192,12 @@ class Metacontrol(ManagingSubsystem):
         if not self.objectives or not self._awaited <= self.measurements.keys():
             self._note_reading_time(0.0)
             return None
-        key = self._state_key()
-        reasoning = self._analyze_and_plan(key)
-        if self.measurements and key.measured.distinguished == tuple(self.measurements.values()):
+        measured = self._measured_key()
+        reasoning = self._analyze_and_plan(measured)
+        if self.measurements and measured[1] == tuple(self.measurements.values()):
             # Any other value is another state, though it is in the same region.
             self._note_reading_time(inf)
-        elif self._plans_again_later(reasoning):
+        elif reasoning.plan.decisions:
             self._note_reading_time(self._longest_latency_s)
         else:
             self._note_reading_time(0.0)
@@ -220,14 +207,6 @@ class Metacontrol(ManagingSubsystem):
         # A derived class with an `adapt` of its own may read for longer than the loop.
         if type(self).adapt is Metacontrol.adapt:
             self.reads_for_s = reads_for_s
-
-    def _plans_again_later(self, reasoning: Reasoning) -> bool:
-        """Whether a cycle goes on after the reasoner's latency, and plans by the values of then.
-
-        They choose the designs; which objectives get one is inferred of the values at the cycle's
-        beginning, so that a cycle without decisions is over.
-        """
-        return bool(reasoning.plan.decisions) or not self._changes_nothing(reasoning)
 
     def _latency_s(self, began_s: float) -> float:
         """Draw how long the cycle that began at a mission time takes to infer."""
@@ -270,12 +249,12 @@ class Metacontrol(ManagingSubsystem):
         modes; return whether another cycle would change nothing.
         """
         began_s = self.system.now_s
-        began_with = self._state_key()
+        measured_before = self._measured_key()
         recovered = self._to_be_forgotten()
         was_idle = self._changes_nothing(reasoning)
         yield self.system.env.timeout(latency_s)
         self.monitor()
-        by_now = self._plan_by_now(began_with, reasoning)
+        by_now = self._plan_by_now(reasoning, measured_before)
         if self.system.recorded and self.needs_knowledge and reasoning.plan.decisions:
             self.system.log_state(by_now.inference.state, began_s)
         if not was_idle or by_now.plan.designs != reasoning.plan.designs:
@@ -422,12 +401,12 @@ class Metacontrol(ManagingSubsystem):
         ends_s = began_s + self._latency_s(began_s)
         if env.now >= ends_s:
             return
-        key = self._state_key()
-        reasoning = self._analyze_and_plan(key)
+        measured_before = self._measured_key()
+        reasoning = self._analyze_and_plan(measured_before)
 
         def carry_out() -> None:
             self.monitor()
-            for decision in self._plan_by_now(key, reasoning).plan.decisions:
+            for decision in self._plan_by_now(reasoning, measured_before).plan.decisions:
                 if decision.function in functions and decision.design is not None:
                     self.system.change_mode(decision.function, decision.design)
 
@@ -454,8 +433,13 @@ class Metacontrol(ManagingSubsystem):
             return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, thresholds)
 
-    def _analyze_and_plan(self, key: StateKey) -> Reasoning:
-        """Analyze and plan, or look up the cached result for an equal state."""
+    def _analyze_and_plan(self, measured: _MeasuredKey) -> Reasoning:
+        """Analyze and plan, or look up the cached result for an equal state.
+
+        Args:
+            measured: the key of the measured values.
+        """
+        key = self._reported_key(), measured
         reasoning = self._reasonings.get(key)
         if reasoning is None:
             inference = self.analyze()
@@ -463,14 +447,14 @@ class Metacontrol(ManagingSubsystem):
             self._keep(key, reasoning)
         return reasoning
 
-    def _plan_by_now(self, began_with: StateKey, reasoning: Reasoning) -> Reasoning:
+    def _plan_by_now(self, reasoning: Reasoning, measured_before: _MeasuredKey) -> Reasoning:
         """Choose designs with the values that are measured now, after the reasoner has inferred
         something of those before.
         """
         measured_now = self._measured_key()
-        if measured_now == began_with.measured or not self._plans_by_now:
+        if measured_now == measured_before or not self._plans_by_now:
             return reasoning
-        key = began_with, measured_now
+        key = reasoning.inference.state, measured_now
         found = self._reasonings.get(key)
         if found is None:
             values = [(name, exact(value)) for name, value in sorted(self.measurements.items())]
@@ -487,23 +471,22 @@ class Metacontrol(ManagingSubsystem):
                 self._reasonings.clear()
             self._reasonings[key] = reasoning
 
-    def _state_key(self) -> StateKey:
-        """Make the key of the state."""
-        reported = (
+    def _reported_key(self) -> Hashable:
+        """Make the key of the state but for what is measured."""
+        return (
             tuple(self.objectives.items()),
             tuple(self.groundings.items()),
             tuple(self.components.items()),
         )
-        return StateKey(reported, self._measured_key())
 
-    def _measured_key(self) -> MeasuredKey:
+    def _measured_key(self) -> _MeasuredKey:
         """Make the key of the measured values: their regions, or, if the mission is recorded or what
         follows may depend on more, the values.
         """
         measured = self.measurements.values()
         if self.system.recorded or not self._is_cacheable:
-            return MeasuredKey(tuple(self.measurements), tuple(measured))
-        return MeasuredKey(tuple(self.measurements), self._reasoner.distinguished(measured))
+            return tuple(self.measurements), tuple(measured)
+        return tuple(self.measurements), self._reasoner.distinguished(measured)
 
     def _changes_nothing(self, reasoning: Reasoning) -> bool:
         """Return whether executing a plan would change nothing, and record nothing."""

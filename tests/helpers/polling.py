@@ -29,7 +29,7 @@ from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.waypoints import WaypointFunction
-from suave_des.managing.metacontrol import Metacontrol, StateKey
+from suave_des.managing.metacontrol import Metacontrol
 from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
@@ -171,7 +171,7 @@ def begin(self: Flight, detector: Any, search: GenerateSearchPath, follow: Follo
     look(0)
 
 
-def analyze_and_plan_anew(self: Metacontrol, key: StateKey) -> Reasoning:
+def analyze_and_plan_anew(self: Metacontrol, measured: object) -> Reasoning:
     """Go through analyze and plan, without looking up the result for an equal state."""
     inference = self.analyze()
     return Reasoning(inference, self.plan(inference))
