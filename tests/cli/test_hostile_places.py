@@ -244,7 +244,7 @@ class TestStopped:
             "def interrupted(name, *rest, **named):\n"
             "    if '_multiarray_umath' in name:\n"
             "        builtins.__import__ = imported\n"
-            "        os.kill(os.getpid(), signal.SIGHUP)\n"
+            "        os.kill(os.getpid(), signal.SIGTERM)\n"
             "    return imported(name, *rest, **named)\n"
             "try:\n"
             "    with signals_raised():\n"
