@@ -46,7 +46,6 @@ class FlightRecord(Record):
     loses_search: bool  # whether the message that was lost is the search's
 
 
-_THERE = Ends.THERE.value
 _OneRecord = FlightRecord * 1
 _BEFORE = 1
 """Place of the vehicle's copy among the records: as it was before the last rows."""
@@ -146,7 +145,7 @@ class Flight:
 
     def fly_to(self, t_s: float) -> None:
         """Fly to mission time t; what ends the flight earlier becomes an event."""
-        while (ends := self._fly(t_s)) != _THERE:
+        while (ends := self._fly(t_s)) != Ends.THERE:
             if ends == Ends.SIGHT:
                 camera = self.state.camera
                 seen_s = camera.next_row * STEP_S

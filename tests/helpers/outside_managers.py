@@ -185,6 +185,26 @@ class SpoilsItsReadingTime(EventTriggered):
         self.reads_for_s = -1.0
 
 
+class KeepsToWake(EventTriggered):
+    """Keeps the function that says that its state has changed."""
+
+    depends_on: ClassVar = EventTriggered.depends_on
+
+    def __init__(self, system: System) -> None:
+        super().__init__(system)
+        self.wake = system.state_changed
+
+
+class CountsPlans(Metacontrol):
+    """Looks at each plan that it executes."""
+
+    decisions: ClassVar[list[int]] = []
+
+    def execute(self, reasoning, latency_s):
+        self.decisions.append(len(reasoning.plan.decisions))
+        return super().execute(reasoning, latency_s)
+
+
 class ThinksFirst(Metacontrol):
     """Begins each cycle half a second after its call, and says so."""
 

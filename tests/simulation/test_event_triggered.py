@@ -13,6 +13,7 @@ from suave_des.managing.metacontrol import Metacontrol
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.scenario.models import ConstantSignal
+from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import OUTSIDE, outside_managers
 from tests.helpers.owl_text import SUAVE, individual
@@ -110,7 +111,7 @@ def test_one_that_reads_values_later_is_called_where_it_would_read_the_new_one(c
     ids=["it read nothing later", "it read later"],
 )
 def test_how_long_a_call_reads_may_differ_from_state_to_state(before_m, after_m, called):
-    """The value of 31.5 s comes after the call of 31 s has begun, and before it is over."""
+    """The new value is published at 31.15 s: the call of 31 s has begun, and is not over."""
     values = steps(before_m, after_m, 31.0)
     assert called_s(values, "ReadsLateInMurkyWater") == called
 
@@ -449,6 +450,20 @@ def test_a_loop_that_begins_its_cycles_later_says_for_how_long_it_reads(shift_s)
 def test_a_reading_time_that_is_none_is_told_after_the_call_that_set_it(record):
     with pytest.raises(MissionError, match=r"SpoilsItsReadingTime.*mission time 1\.00 s.*-1\.0"):
         called_s(NO_FAULTS, "SpoilsItsReadingTime", record=record)
+
+
+def test_a_manager_may_say_that_its_state_has_changed_after_the_mission_was_closed():
+    mission = Mission(simulator_of(NO_FAULTS), f"{OUTSIDE}:KeepsToWake")
+    mission.advance(40.0)  # it sleeps
+    mission.close()
+    mission.manager.wake()
+    assert mission.now_s == 40.0
+
+
+def test_a_derived_loop_may_look_at_the_plans_that_it_executes():
+    outside_managers.CountsPlans.decisions.clear()
+    simulator_of(NO_FAULTS).run(f"{OUTSIDE}:CountsPlans", 1, 1)
+    assert outside_managers.CountsPlans.decisions[0] == 2  # the task's two functions
 
 
 STRONG_CURRENT = (
