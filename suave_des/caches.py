@@ -1,8 +1,8 @@
 """The user's cache folder, for what can be made again, and files in it that are checked before use.
 
-`inferences/` has what Pellet inferred, `numba/` machine code, `findings/` what `kb check` found,
-`campaigns/` which campaigns with code of their own this user has begun. Each may be deleted at any
-time.
+`inferences/` has what Pellet inferred, `ontologies/` what ontology files state, `numba/` machine
+code, `findings/` what `kb check` found, `campaigns/` which campaigns with code of their own this
+user has begun. Each may be deleted at any time.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,15 @@ def _private(folder: Path) -> Path:
     return folder
 
 
+@lru_cache
+def hash_of_code(folder: Path) -> str:
+    """SHA-256 of the programs and grammars in a folder: what they made may differ from what they
+    make now.
+    """
+    paths = sorted((*folder.rglob("*.py"), *folder.rglob("*.lark")))
+    return hashlib.sha256(b"".join(map(Path.read_bytes, paths))).hexdigest()
+
+
 def keep_latest(folder: Path, pattern: str, most: int) -> None:
     """Remove the least recently used files of a pattern in a folder, so that `most` stay."""
     files = sorted(folder.glob(pattern), key=lambda path: path.stat().st_mtime)
@@ -120,7 +130,7 @@ class SharedEntries:
             handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
             try:
                 size = os.fstat(handle).st_size
-                if size < MAX_BYTES:
+                if size + len(text) < MAX_BYTES:
                     # The line break before it ends a line that another process left unfinished.
                     os.write(handle, b"\n" + self._checksum(text) + b" " + text + b"\n")
             finally:

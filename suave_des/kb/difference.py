@@ -31,8 +31,8 @@ from suave_des.knowledge.rdf import (
     is_fact,
     local_name,
     n_triple,
-    term_of,
 )
+from suave_des.knowledge.rdf_files import term_of
 from suave_des.knowledge.reasoner import regions_of
 from suave_des.knowledge.rules import write_term
 from suave_des.knowledge.state import KnowledgeState

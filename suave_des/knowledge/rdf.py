@@ -18,9 +18,6 @@ from contextlib import contextmanager, suppress
 from decimal import Decimal, InvalidOperation
 from typing import NamedTuple, TypeGuard, TypeVar
 
-from rdflib import Literal, URIRef
-from rdflib.term import Node
-
 from suave_des.knowledge.state import Fact, Value, plain_text
 
 TOMASYS = "http://metacontrol.org/tomasys#"
@@ -190,13 +187,6 @@ def numbered_nodes(
         yield found.get(subject, subject), predicate, found.get(value, value)
 
 
-def term_of(term: Node) -> str | Lit:
-    """Convert an IRI or a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
-    if not isinstance(term, Literal):
-        return str(term)
-    return Lit(str(term), f"@{term.language}" if term.language else str(term.datatype or STRING))
-
-
 @contextmanager
 def without_log() -> Iterator[None]:
     """Keep rdflib's warnings about odd terms off the terminal."""
@@ -217,6 +207,8 @@ def is_well_formed(value: Lit) -> bool:
         return form.fullmatch(value.text.strip()) is not None
     if not value.datatype.startswith(XSD):
         return True
+    from rdflib import Literal, URIRef  # which take a while, and which missions do without
+
     with without_log():
         return not Literal(value.text, datatype=URIRef(value.datatype)).ill_typed
 

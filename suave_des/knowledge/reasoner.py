@@ -25,8 +25,9 @@ from importlib.metadata import version
 from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from suave_des.caches import SharedEntries, private_cache
+from suave_des.caches import SharedEntries, hash_of_code, private_cache
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import rdf
 from suave_des.knowledge.ontology import OPERATORS, Ontology, Terms
@@ -59,6 +60,9 @@ from suave_des.knowledge.state import (
     Value,
     exact,
 )
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
 
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
 _SIZELESS = rdf.terms(XSD, "decimal string boolean anyURI dateTime date")
@@ -371,9 +375,13 @@ Backend = Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
 def _in_process(
     ontology: Ontology, limit: TimeLimit, terms: Terms | None, *, at_once: bool = True
 ) -> Backend:
-    from suave_des.knowledge.pellet.in_process import InProcessPellet
+    @cache
+    def pellet() -> InProcessPellet:
+        # with JPype: inferences that are known are made without Java
+        from suave_des.knowledge.pellet.in_process import InProcessPellet
 
-    pellet = cache(lambda: InProcessPellet(ontology, terms))
+        return InProcessPellet(ontology, terms)
+
     if at_once:
         limit.run(pellet, LOADING)
     return lambda state, assertions: limit.run(
@@ -587,15 +595,10 @@ def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
     """
     knowledge = f"{_FORMAT}{ontology.content_hash}{terms or ''}"
     libraries = "".join(f"{name} {version(name)}\n" for name in _LIBRARIES)
-    programs = f"{libraries}python {platform.python_version()}\n{_code()}"
+    programs = (
+        f"{libraries}python {platform.python_version()}\n{hash_of_code(Path(__file__).parent)}"
+    )
     return hashlib.sha256(f"{knowledge}{programs}".encode()).hexdigest()
-
-
-@lru_cache(maxsize=1)
-def _code() -> str:
-    folder = Path(__file__).parent
-    paths = sorted((*folder.rglob("*.py"), *folder.rglob("*.lark")))
-    return hashlib.sha256(b"".join(map(Path.read_bytes, paths))).hexdigest()
 
 
 _READERS: dict[str, Callable[[str], Value]] = {

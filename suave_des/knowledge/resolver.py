@@ -21,21 +21,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from urllib.parse import urldefrag, urljoin, urlsplit
-from urllib.request import url2pathname
+from urllib.parse import unquote, urldefrag, urljoin, urlsplit
 
 from lxml import etree
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.ontology_file import (
-    ONTOLOGY_LIMIT_BYTES,
-    RELATIVE_TO,
-    TURTLE_ENDINGS,
-    OntologyFile,
-    is_iri,
-    read_ontology,
-)
+from suave_des.knowledge.notation import RELATIVE_TO, TURTLE_ENDINGS, is_iri
+from suave_des.knowledge.ontology_file import ONTOLOGY_LIMIT_BYTES, OntologyFile, read_ontology
 from suave_des.knowledge.rdf import MROS, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 
@@ -254,7 +247,7 @@ def _path_of(file: OntologyFile, iri: str) -> Path | None:
     """Return the path that an import itself names; None if it names none."""
     parts = urlsplit(urldefrag(as_written(iri))[0])
     if _is_relative(iri) or parts.scheme == "file":
-        return file.path.parent / url2pathname(parts.path)
+        return file.path.parent / unquote(parts.path)
     return None
 
 
@@ -285,7 +278,7 @@ def _in_catalog(file: OntologyFile, iri: str) -> Path | None:
         name = entry.get("name", "")
         uri = entry.get("uri", "")
         if is_iri(name) and is_iri(uri) and _comparable(name) == _comparable(iri):
-            path = catalog.parent / url2pathname(urlsplit(urljoin(entry.base or "", uri)).path)
+            path = catalog.parent / unquote(urlsplit(urljoin(entry.base or "", uri)).path)
             if _is_file(path):
                 return path
     return None

@@ -31,9 +31,9 @@ from suave_des.knowledge.rdf import (
     for_pellet,
     n_triple,
     reached,
-    term_of,
 )
 from suave_des.knowledge.rdf import RDF as RDF_IRI
+from suave_des.knowledge.rdf_files import term_of
 
 _PLAIN = RDF_IRI + "PlainLiteral"
 _STATE_IRI = "urn:suave-des:state"

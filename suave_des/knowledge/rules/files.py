@@ -13,8 +13,6 @@ from itertools import chain, count
 from pathlib import Path
 from typing import NamedTuple
 
-import rdflib
-
 from suave_des.errors import Finding, InputError, KnowledgeError, Level, nearest, with_article
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge import rdf
@@ -343,8 +341,10 @@ def _range_problem(
     if is_head:
         words = f"datatype {name} occurs in the head"
         return Problem(atom.place(), words, "Pellet takes datatypes in bodies only")
+    from rdflib import XSD  # with all of rdflib, which few rules need
+
     defined = (iri for iri, kinds in vocabulary.kinds.items() if "datatype" in kinds)
-    known = [*map(str, dir(rdflib.XSD)), *defined]
+    known = [*map(str, dir(XSD)), *defined]
     if atom.expression or atom.predicate in known:
         return None
     words = f"datatype {name} is not defined"
