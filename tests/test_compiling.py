@@ -180,6 +180,25 @@ print(bool(own), [each.py_func.__name__ for each in own if each.stats.cache_miss
 """
 
 
+ALLOCATES = """
+import numpy
+from suave_des.compiling import compiled
+
+@compiled
+def solved(matrix):
+    return (numpy.linalg.inv(matrix) @ matrix).sum() + numpy.zeros(3).sum() + numpy.sin(matrix[0, 0])
+
+print(solved(numpy.array([[1.0, 2.0], [3.0, 5.0]])), dict(solved.stats.cache_hits) != {})
+"""
+
+
+def test_kept_code_finds_what_it_calls(tmp_path):
+    first, second = (python("-c", ALLOCATES, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    assert (first.returncode, second.returncode) == (0, 0), second.stderr
+    total, was_found = second.stdout.split()
+    assert (total, was_found) == (first.stdout.split()[0], "True")
+
+
 def test_a_process_compiles_nothing_of_a_mission_that_another_has_flown():
     """With the cache of all tests, the first may be that process already."""
     assert any(python("-c", MISSION).stdout == "True []\n" for _ in range(2))
