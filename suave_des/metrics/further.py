@@ -176,33 +176,57 @@ def covered_area_m2(
             measurement.
         view_tangent: tangent of half the camera's field of view.
     """
-    rows = track[: last_row + 1 : _ROW_STEP, :3]
-    height_m = rows[:, 2] - sea_bed_z_m
-    seen = rows[height_m <= visibility_m[: last_row + 1 : _ROW_STEP]]
-    if len(seen) == 0:
+    x_m, y_m, z_m = track[: last_row + 1 : _ROW_STEP, :3].T
+    height_m = z_m - sea_bed_z_m
+    is_seen = height_m <= visibility_m[: last_row + 1 : _ROW_STEP]
+    if not is_seen.any():
         return 0.0
-    half_m = (seen[:, 2] - sea_bed_z_m) * view_tangent
-    low = (seen[:, :2] - half_m[:, None]).min(axis=0)
-    size = (seen[:, :2] + half_m[:, None]).max(axis=0) - low
-    cell_m = max(CELL_M, math.sqrt(size[0] * size[1] / _MAX_CELLS))
-    grid = np.zeros((int(size[0] / cell_m) + 2, int(size[1] / cell_m) + 2), dtype=np.uint8)
-    return _mark(seen, half_m, (float(low[0]), float(low[1])), cell_m, grid) * cell_m * cell_m
+    x_m = x_m[is_seen]
+    y_m = y_m[is_seen]
+    half_m = height_m[is_seen] * view_tangent
+    low_x_m = float((x_m - half_m).min())
+    low_y_m = float((y_m - half_m).min())
+    size_x_m = float((x_m + half_m).max()) - low_x_m
+    size_y_m = float((y_m + half_m).max()) - low_y_m
+    cell_m = max(CELL_M, math.sqrt(size_x_m * size_y_m / _MAX_CELLS))
+    grid = np.zeros((int(size_x_m / cell_m) + 2, int(size_y_m / cell_m) + 2), dtype=np.uint8)
+    return _mark(x_m, y_m, half_m, (low_x_m, low_y_m), cell_m, grid) * cell_m * cell_m
 
 
 @compiled
 def _mark(
-    seen: Array, half_m: Array, low: tuple[float, float], cell_m: float, grid: NDArray[np.uint8]
+    x_m: Array,
+    y_m: Array,
+    half_m: Array,
+    low_m: tuple[float, float],
+    cell_m: float,
+    grid: NDArray[np.uint8],
 ) -> int:
-    """Mark the cells whose centre is in view from each place; return how many there are."""
+    """Mark the cells whose centre is in view from each place; return how many there are.
+
+    From one place to the next most of the view stays the same: these cells are passed over.
+    """
+    low_x_m, low_y_m = low_m
     count = 0
-    for row in range(seen.shape[0]):
-        first_x = math.ceil((seen[row, 0] - half_m[row] - low[0]) / cell_m - 0.5)
-        last_x = math.floor((seen[row, 0] + half_m[row] - low[0]) / cell_m - 0.5)
-        first_y = math.ceil((seen[row, 1] - half_m[row] - low[1]) / cell_m - 0.5)
-        last_y = math.floor((seen[row, 1] + half_m[row] - low[1]) / cell_m - 0.5)
-        for i in range(max(first_x, 0), min(last_x + 1, grid.shape[0])):
-            for j in range(max(first_y, 0), min(last_y + 1, grid.shape[1])):
-                if grid[i, j] == 0:
+    from_x = to_x = from_y = to_y = 0  # cells in view
+    for place in range(half_m.shape[0]):
+        before_x = from_x, to_x
+        before_y = from_y, to_y
+        from_x = max(math.ceil((x_m[place] - half_m[place] - low_x_m) / cell_m - 0.5), 0)
+        last_x = math.floor((x_m[place] + half_m[place] - low_x_m) / cell_m - 0.5)
+        to_x = min(last_x + 1, grid.shape[0])
+        from_y = max(math.ceil((y_m[place] - half_m[place] - low_y_m) / cell_m - 0.5), 0)
+        last_y = math.floor((y_m[place] + half_m[place] - low_y_m) / cell_m - 0.5)
+        to_y = min(last_y + 1, grid.shape[1])
+        for i in range(from_x, to_x):
+            was_in_view = before_x[0] <= i < before_x[1]
+            j = from_y
+            while j < to_y:
+                if was_in_view and before_y[0] <= j < before_y[1]:
+                    j = before_y[1]
+                elif grid[i, j] == 0:
                     grid[i, j] = 1
                     count += 1
+                else:
+                    j += 1
     return count

@@ -2,16 +2,17 @@
 requirements.
 """
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 import simpy
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.metrics.further import FurtherMetrics, covered_area_m2, measured_at_rows
+from suave_des.metrics.further import CELL_M, FurtherMetrics, covered_area_m2, measured_at_rows
 from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import (
@@ -111,6 +112,37 @@ def test_a_camera_at_rest_has_seen_one_square():
     assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(
         side_m**2, rel=0.1
     )
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.0, 4.0)),
+        min_size=1,
+        max_size=12,
+    )
+)
+@example([(0.0, 0.0, 1.0), (0.05, 0.0, 1.0), (0.0, 0.0, 1.0)])  # one view in the other, and back
+@example([(0.0, 0.0, 1.0), (0.0, 0.0, 3.0), (0.3, 0.2, 2.0)])
+@example([(-3.0, 0.0, 1.0), (3.0, 0.0, 1.0)])  # far apart
+def test_the_area_is_that_of_all_cells_whose_centre_was_in_view(places):
+    track, visibility_m = track_of(*((x, y, height - 20.0) for x, y, height in places))
+    seen = [place for place in places if (place[2] - 20.0) + 20.0 <= 3.0]
+    cells = set[tuple[int, int]]()
+    if seen:
+        x_m, y_m, height_m = np.array(seen).T
+        half_m = ((height_m - 20.0) + 20.0) * TANGENT
+        low = (x_m - half_m).min(), (y_m - half_m).min()
+        for x, y, half in zip(x_m, y_m, half_m, strict=True):
+            ranges = [
+                range(
+                    max(0, math.ceil((middle - half - least) / CELL_M - 0.5)),
+                    math.floor((middle + half - least) / CELL_M - 0.5) + 1,
+                )
+                for middle, least in zip((x, y), low, strict=True)
+            ]
+            cells.update(itertools.product(*ranges))
+    area_m2 = covered_area_m2(track, len(track) - 1, visibility_m, -20.0, TANGENT)
+    assert area_m2 == pytest.approx(len(cells) * CELL_M**2)
 
 
 @pytest.mark.parametrize("visibility_m", [1.9, math.nan])
