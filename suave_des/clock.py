@@ -55,7 +55,7 @@ class MissionEnvironment(simpy.Environment):
         """
         if delay != delay:
             raise ValueError(f"the delay of an event is {delay}")
-        super().schedule(event, priority, delay)
+        heappush(self._queue, (self._now + delay, priority, next(self._eid), event))
 
     def advance(self, t_s: float) -> None:
         """Process all events before mission time t, and go there; stop at the event of the

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -34,6 +35,7 @@ ON_THE_WAY = "normal"
 ARRIVED = "inactive"
 
 
+@lru_cache(maxsize=64)
 def least_that_reaches(threshold: float) -> float:
     """Find the least number that is not below a threshold for the exemplar's trees, which compare
     in single precision: a number is rounded to it first.

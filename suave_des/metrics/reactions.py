@@ -139,16 +139,16 @@ class _OpenEvents:
     def take(self, entry: _Entry) -> None:
         """Take an entry; they come in order of time."""
         match entry:
-            case _Failure(t_s):
+            case _Effect():
+                self._mode_effect(*entry)
+            case _Fitting():
+                self._expected_m = entry.altitude_m
+                self._compare_at(entry.t_s)
+            case _BatteryLevel():
+                self._battery(*entry)
+            case _Failure():
                 if not self._recovering:
-                    self._since_s.setdefault("failure", t_s)
-            case _Fitting(t_s, altitude_m):
-                self._expected_m = altitude_m
-                self._compare_at(t_s)
-            case _BatteryLevel(t_s, is_low):
-                self._battery(t_s, is_low)
-            case _Effect(t_s, function, mode):
-                self._mode_effect(t_s, function, mode)
+                    self._since_s.setdefault("failure", entry.t_s)
 
     def _battery(self, t_s: float, low: bool) -> None:
         if low:

@@ -113,7 +113,8 @@ class CallTimes:
         """Whether the tables have all that a left-out call would read: either nothing can be
         recharged, or no call reads values after its beginning.
         """
-        return not any(each.may_change for each, _ in depends_on) or not any(self._idle.values())
+        reads_later = any(self._idle.values())
+        return not reads_later or not any(each.may_change for each, _ in depends_on)
 
     def _next_needed_s(self, depends_on: _DependsOn, regions: _Regions, until_s: float) -> float:
         """Find the first of the manager's times at which a call may change something; inf: there is

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from types import GeneratorType
 from typing import Any, TypeVar
 
 from suave_des.domain import Task
@@ -142,7 +143,7 @@ class ManagerHost:
         if adaptation is None:
             # A call that was refused something would ask again.
             self._go_on(times, modes.requests > requests, modes.refusals == refusals)
-        elif isinstance(adaptation, Generator):
+        elif isinstance(adaptation, GeneratorType | Generator):  # the former is asked for quickly
             over = partial(self._adapted, times, self.system.env.now)
             AdaptationCall(self.system.env, adaptation, over, self.error_of).resume()
         else:
