@@ -457,6 +457,8 @@ def _work(
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:
+            # What the summary needs, which takes 0.2 s, while workers start; SciPy finds it loaded.
+            import_module("scipy.special")
             for among in executor(campaign, campaign.missions(store.settled), left):
                 finished = []
                 for key, each in among:
