@@ -35,10 +35,16 @@ from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.records.store import MissionFailure, MissionKey
 from suave_des.registry import is_built_in
 
-_LARGEST_CHUNK = 10
-"""Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end
-together.
+_CHUNK_S = 0.1
+"""About how long the missions of a chunk take: chunks under way are lost when a campaign is stopped,
+and smaller ones cost more of this process's time.
 """
+_FIRST_CHUNK, _LARGEST_CHUNK = 10, 100
+"""Missions: before it is known how long they take, and at most."""
+_SHARES = 10
+"""Chunks, at least, into which what is left is divided for each worker, so that they end together."""
+_TIMED_OUT = 10
+"""Missions of a chunk that may take all of their time before its worker counts as overdue."""
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
 _ATTEMPTS = 3
@@ -103,6 +109,7 @@ class LocalWorkers:
         self._ended_in_a_row = 0
         self._stuck_in_a_row = Counter[int]()  # by manager
         self._again = deque[_Task]()
+        self._left = 0  # missions that no worker has been given, about
 
     def __enter__(self) -> Self:
         """Start the workers, which import what they need before there is work for them."""
@@ -126,10 +133,9 @@ class LocalWorkers:
         self, campaign: Campaign, missions: Iterable[MissionKey], total: int
     ) -> Iterator[list[Finished]]:
         """Yield outcomes chunk by chunk; see Executor."""
-        size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
+        self._left = total
         remaining = iter(missions)
         content = packed(campaign)
-        chunks = iter(lambda: tuple(islice(remaining, size)), ())
         for worker in self._workers:
             worker.send(content)
         while busy := [worker for worker in self._workers if worker.due_s < inf]:
@@ -141,6 +147,7 @@ class LocalWorkers:
                     continue
                 if answer.is_of_chunk:
                     worker.tasks.popleft()
+                    worker.chunk = answer.missions_in(_CHUNK_S)
                     self._ended_in_a_row = 0
                 if answer.left:
                     self._again.append((answer.left, 0))
@@ -149,7 +156,7 @@ class LocalWorkers:
                     self._remove(worker)
                     self._start().send(content)
                 else:
-                    self._give_tasks(worker, chunks, campaign.spec.time_out_s)
+                    self._give_tasks(worker, remaining, campaign.spec.time_out_s)
                 if answer.is_of_chunk:
                     yield answer.outcomes
         self._is_done = True
@@ -170,22 +177,31 @@ class LocalWorkers:
                 f"{problem} (raise the limit, see ulimit -a, or give --workers 1)"
             ) from None
 
-    def _give_tasks(self, worker: _Worker, chunks: Iterator[Chunk], time_out_s: float) -> None:
+    def _give_tasks(
+        self, worker: _Worker, missions: Iterator[MissionKey], time_out_s: float
+    ) -> None:
         """Give a worker tasks until it has _AHEAD, while there are any; and time for the first."""
         while len(worker.tasks) < _AHEAD:
             if self._again:
                 task = self._again.popleft()
-            elif (chunk := next(chunks, None)) is not None:
+            elif chunk := self._next_chunk(worker, missions):
                 task = (chunk, 0)
             else:
                 break
             worker.tasks.append(task)
             worker.send(task[0])
         if worker.tasks:
-            limit_s = time_out_s * len(worker.tasks[0][0]) + _MARGIN_S
-            worker.due_s = time.monotonic() + limit_s
+            timed_out = min(len(worker.tasks[0][0]), _TIMED_OUT)
+            worker.due_s = time.monotonic() + time_out_s * timed_out + _MARGIN_S
         else:
             worker.due_s = inf
+
+    def _next_chunk(self, worker: _Worker, missions: Iterator[MissionKey]) -> Chunk:
+        """Take a worker's next chunk of missions; empty if there are none."""
+        share = self._left // (self._size * _SHARES)
+        chunk = tuple(islice(missions, max(1, min(worker.chunk, share))))
+        self._left -= len(chunk)
+        return chunk
 
     def _is_to_be_replaced(self, answer: Answer) -> bool:
         """Whether the reasoner of a worker does not come back, and another worker may do better.
@@ -236,13 +252,14 @@ class _Worker:
     tasks, oldest first.
 
     `due_s` is when it has to be done with the oldest, infinite if it has nothing to do; once that
-    is over, it is killed as overdue.
+    is over, it is killed as overdue. `chunk` is how many missions it may be given as the next one.
     """
 
     process: SpawnProcess
     connection: Connection[Any, Any]
     due_s: float
     tasks: deque[_Task] = field(default_factory=deque)
+    chunk: int = _FIRST_CHUNK
     is_overdue: bool = False
 
     def send(self, message: object) -> None:
@@ -363,12 +380,20 @@ class Answer(NamedTuple):
         is_stuck: whether that is so.
         is_of_chunk: whether it is about a chunk, and not the first answer, which says that it is
             ready.
+        took_s: how long the chunk's missions took.
     """
 
     outcomes: list[Finished]
     left: Chunk = ()
     is_stuck: bool = False
     is_of_chunk: bool = True
+    took_s: float = 0.0
+
+    def missions_in(self, seconds: float) -> int:
+        """How many such missions fit into a time; at least one."""
+        if len(self.outcomes) * seconds >= _LARGEST_CHUNK * self.took_s:
+            return _LARGEST_CHUNK
+        return max(1, int(len(self.outcomes) * seconds / self.took_s))
 
 
 def work(connection: Connection[Any, Any]) -> None:
@@ -389,8 +414,10 @@ def work(connection: Connection[Any, Any]) -> None:
                     answer = Answer([], is_of_chunk=False)
                 else:
                     left = iter(message)
+                    began_s = time.monotonic()
                     outcomes = finished(runner, left, until_stuck=True)
-                    answer = Answer(outcomes, tuple(left), reasoner_is_stuck())
+                    took_s = time.monotonic() - began_s
+                    answer = Answer(outcomes, tuple(left), reasoner_is_stuck(), took_s=took_s)
             except SuaveDesError as error:
                 answer = error
             except Exception:

@@ -10,6 +10,7 @@ import math
 import os
 import re
 import sys
+from collections.abc import Iterator
 from contextlib import redirect_stderr
 from pathlib import Path
 from types import ModuleType
@@ -20,7 +21,7 @@ import pytest
 from suave_des.campaign import progress as display
 from suave_des.campaign import workers
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.missions import GIVEN_UP, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, Remark, WorkerError
 from suave_des.campaign.progress import Progress
 from suave_des.campaign.results import CampaignResult
 from suave_des.campaign.workers import LocalWorkers
@@ -475,12 +476,53 @@ thread.join()
     assert (done.stdout, done.stderr) == ("done\n", "")
 
 
-def test_a_worker_has_the_time_limit_for_each_mission_of_the_chunk_that_it_runs(monkeypatch):
+@pytest.mark.parametrize(("missions", "counted"), [(3, 3), (10, 10), (100, 10)])
+def test_a_worker_has_the_time_limit_for_each_of_some_missions_of_a_chunk(
+    missions, counted, monkeypatch
+):
     monkeypatch.setattr(workers.time, "monotonic", lambda: 1000.0)
-    worker = workers._Worker(process=None, connection=Quiet(), due_s=math.inf)  # type: ignore[arg-type]
-    first, second = (tuple(MissionKey(0, 0, run) for run in runs) for runs in ((1, 2, 3), (4,)))
-    LocalWorkers(["none"], 1)._give_tasks(worker, iter([first, second]), time_out_s=20.0)
-    assert worker.due_s == 1000.0 + 3 * 20.0 + workers._MARGIN_S
+    pool = LocalWorkers(["none"], 1)
+    worker = idle_worker(chunk=missions)
+    pool._left = 10_000
+    pool._give_tasks(worker, keys(10_000), time_out_s=20.0)
+    assert len(worker.tasks[0][0]) == missions
+    assert worker.due_s == 1000.0 + counted * 20.0 + workers._MARGIN_S
+
+
+def test_chunks_become_smaller_towards_the_end():
+    pool = LocalWorkers(["none"], 2)
+    pool._left = 1000
+    worker = idle_worker(chunk=100)
+    missions = keys(1000)
+    sizes = []
+    while not sizes or sizes[-1]:
+        sizes.append(len(pool._next_chunk(worker, missions)))
+    assert sum(sizes) == 1000
+    assert sizes == sorted(sizes, reverse=True)
+    assert (sizes[0], sizes[-2]) == (1000 // (2 * workers._SHARES), 1)
+
+
+def test_missions_that_are_more_than_was_said_are_given_one_by_one():
+    pool = LocalWorkers(["none"], 1)
+    pool._left = 0
+    assert len(pool._next_chunk(idle_worker(chunk=100), keys(5))) == 1
+
+
+@pytest.mark.parametrize(
+    ("missions", "took_s", "fit"),
+    [(10, 0.01, 100), (10, 0.0, 100), (10, 0.5, 2), (10, 30.0, 1), (1, 0.025, 4), (0, 5.0, 1)],
+)
+def test_a_chunk_has_as_many_missions_as_fit_into_its_time(missions, took_s, fit):
+    outcomes = [(key, Remark("none", "")) for key in keys(missions)]
+    assert workers.Answer(outcomes, took_s=took_s).missions_in(0.1) == fit
+
+
+def keys(count: int) -> Iterator[MissionKey]:
+    return (MissionKey(0, 0, run) for run in range(1, count + 1))
+
+
+def idle_worker(chunk: int) -> workers._Worker:
+    return workers._Worker(process=None, connection=Quiet(), due_s=math.inf, chunk=chunk)  # type: ignore[arg-type]
 
 
 def test_a_worker_without_tasks_has_all_the_time():

@@ -86,7 +86,7 @@ def test_no_empty_folder_is_left(number, after_s, scenario, tmp_path):
 def test_workers_leave_ctrl_c_to_the_campaign(scenario, tmp_path):
     """A terminal sends it to all processes of a command; each would say so in many lines."""
     process = chaos.start(
-        [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"],
+        [str(scenario), "--managers", "none", "--runs", "4000", "--workers", "2", "--out", "out"],
         tmp_path,
     )
     wait_until(lambda: has_size(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000))
