@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from math import inf, isfinite
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,10 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             raise InputError(
                 f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"
             )
+        for name, weight in reward.items():
+            if not (isinstance(weight, Real) and isfinite(weight)):
+                problem = f"reward: {name} is {shown(weight)}"
+                raise InputError(problem, remedy="give a finite number")
         self._weights = REWARD | dict(reward)
         if not isinstance(scenario, Simulator):
             scenario = Simulator(load_scenario(scenario))
