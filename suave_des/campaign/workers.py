@@ -36,13 +36,13 @@ from suave_des.records.store import MissionFailure, MissionKey
 from suave_des.registry import is_built_in
 
 _CHUNK_S = 0.1
-"""About how long the missions of a chunk take: chunks under way are lost when a campaign is stopped,
-and smaller ones cost more of this process's time.
+"""About how long the missions of a chunk take: those under way are lost when a campaign is stopped,
+and smaller chunks cost more of this process's time.
 """
 _FIRST_CHUNK, _LARGEST_CHUNK = 10, 100
 """Missions: before it is known how long they take, and at most."""
 _SHARES = 10
-"""Chunks, at least, into which what is left is divided for each worker, so that they end together."""
+"""Chunks, at least, into which what is left is divided for each worker: so they end together."""
 _TIMED_OUT = 10
 """Missions of a chunk that may take all of their time before its worker counts as overdue."""
 _AHEAD = 2

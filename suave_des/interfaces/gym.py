@@ -94,14 +94,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
                 f"render_mode: there is no {shown(render_mode)}",
                 remedy='give "rgb_array", or None; `suave-des replay` shows a mission in a browser',
             )
-        if not reward.keys() <= REWARD.keys():
-            raise InputError(
-                f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"
-            )
-        for name, weight in reward.items():
-            if not (isinstance(weight, Real) and isfinite(weight)):
-                problem = f"reward: {name} is {shown(weight)}"
-                raise InputError(problem, remedy="give a finite number")
+        _check_weights(reward)
         self._weights = REWARD | dict(reward)
         if not isinstance(scenario, Simulator):
             scenario = Simulator(load_scenario(scenario))
@@ -252,6 +245,17 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
             "task": self._task.name if self._task else "",
         }
         return now | ({"metrics": mission.metrics()} if mission.is_over else {})
+
+
+def _check_weights(reward: Mapping[str, float]) -> None:
+    if not reward.keys() <= REWARD.keys():
+        raise InputError(
+            f"reward: {shown(dict(reward))} has other keys", remedy=f"give {', '.join(REWARD)}"
+        )
+    for name, weight in reward.items():
+        if not (isinstance(weight, Real) and isfinite(weight)):
+            problem = f"reward: {name} is {shown(weight)}"
+            raise InputError(problem, remedy="give a finite number")
 
 
 def _choices(loaded: LoadedScenario) -> dict[str, tuple[str, ...]]:
