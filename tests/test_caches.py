@@ -97,3 +97,11 @@ def test_a_file_that_is_full_gets_no_more_entries(filled, monkeypatch):
     monkeypatch.setattr("suave_des.caches.MAX_BYTES", filled.stat().st_size)
     SharedEntries(filled.parent, "d").add("more", 1)
     assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
+
+
+def test_an_entry_that_is_larger_than_a_file_is_not_kept(filled, monkeypatch):
+    monkeypatch.setattr("suave_des.caches.MAX_BYTES", filled.stat().st_size + 100)
+    entries = SharedEntries(filled.parent, "d")
+    entries.add("large", "x" * 100)
+    entries.add("small", "x")
+    assert dict(entries.read()) == {**ENTRIES, "small": "x"}
