@@ -74,8 +74,8 @@ def _private(folder: Path) -> Path:
 
 @lru_cache
 def hash_of_code(folder: Path) -> str:
-    """SHA-256 of the programs and grammars in a folder: what they made may differ from what they
-    make now.
+    """SHA-256 of the programs and grammars in a folder, so that what other versions of them have
+    made is not used.
     """
     paths = sorted((*folder.rglob("*.py"), *folder.rglob("*.lark")))
     return hashlib.sha256(b"".join(map(Path.read_bytes, paths))).hexdigest()
@@ -124,8 +124,10 @@ class SharedEntries:
         """Append an entry, a value of JSON."""
         if self._path is None:
             return
-        text = json.dumps([key, value], separators=(",", ":")).encode()
-        with suppress(OSError):  # without its file the cache is slower, not wrong
+        # as it is: the escapes of two halves of a surrogate pair would be read as one character
+        written = json.dumps([key, value], separators=(",", ":"), ensure_ascii=False)
+        with suppress(OSError, UnicodeEncodeError):  # without it the cache is slower, not wrong
+            text = written.encode()
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
             try:

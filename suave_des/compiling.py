@@ -139,8 +139,8 @@ class _CodeCache(caching._Cache):
     def load_overload(self, signature: object, target_context: Any) -> object:
         """Load the machine code for a signature; None if there is none that can be used."""
         with suppress(Exception):  # there is no end to what a file leads to
-            # What machine code calls of numba's own. To load all that compiling needs, as numba's
-            # cache does before it reads a file, takes 0.2 s.
+            # The functions of numba that machine code calls. numba's own cache calls
+            # target_context.refresh() here: all that compiling needs, which takes 0.2 s.
             rtsys.initialize(target_context)
             path, made_from = self._place(signature, target_context.codegen())
             content = path.read_bytes()

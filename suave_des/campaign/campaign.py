@@ -457,7 +457,7 @@ def _work(
                 done += 1
                 failed += isinstance(each, MissionFailure)
         if left := campaign.planned - done:
-            # What the summary needs, which takes 0.2 s, while workers start; SciPy finds it loaded.
+            # The summary needs it in the end. It takes 0.2 s, which workers take to start, too.
             import_module("scipy.special")
             for among in executor(campaign, campaign.missions(store.settled), left):
                 finished = []

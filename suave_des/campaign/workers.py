@@ -9,11 +9,10 @@ import signal
 import sys
 import time
 import traceback
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import islice
 from math import inf
 from multiprocessing import Pipe, resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -39,12 +38,12 @@ _CHUNK_S = 0.1
 """About how long the missions of a chunk take: those under way are lost when a campaign is stopped,
 and smaller chunks cost more of this process's time.
 """
-_FIRST_CHUNK, _LARGEST_CHUNK = 10, 100
-"""Missions: before it is known how long they take, and at most."""
+_FIRST_CHUNK, _LARGEST_CHUNK = 10, 30
+"""Missions: before it is known how long they take; and at most, as a worker that hangs has the time
+limit of all of them.
+"""
 _SHARES = 10
 """Chunks, at least, into which what is left is divided for each worker: so they end together."""
-_TIMED_OUT = 10
-"""Missions of a chunk that may take all of their time before its worker counts as overdue."""
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
 _ATTEMPTS = 3
@@ -109,7 +108,11 @@ class LocalWorkers:
         self._ended_in_a_row = 0
         self._stuck_in_a_row = Counter[int]()  # by manager
         self._again = deque[_Task]()
-        self._left = 0  # missions that no worker has been given, about
+        self._left = (
+            0  # missions that no worker has been given yet; the caller knows about how many
+        )
+        # How long a mission of each manager seems to take, by the manager's number.
+        self._mission_s = defaultdict[int, float](lambda: _CHUNK_S / _FIRST_CHUNK)
 
     def __enter__(self) -> Self:
         """Start the workers, which import what they need before there is work for them."""
@@ -146,8 +149,8 @@ class LocalWorkers:
                     self._start().send(content)
                     continue
                 if answer.is_of_chunk:
-                    worker.tasks.popleft()
-                    worker.chunk = answer.missions_in(_CHUNK_S)
+                    chunk, _ = worker.tasks.popleft()
+                    self._note_time(chunk, answer.took_s)
                     self._ended_in_a_row = 0
                 if answer.left:
                     self._again.append((answer.left, 0))
@@ -184,24 +187,39 @@ class LocalWorkers:
         while len(worker.tasks) < _AHEAD:
             if self._again:
                 task = self._again.popleft()
-            elif chunk := self._next_chunk(worker, missions):
+            elif chunk := self._next_chunk(missions):
                 task = (chunk, 0)
             else:
                 break
             worker.tasks.append(task)
             worker.send(task[0])
         if worker.tasks:
-            timed_out = min(len(worker.tasks[0][0]), _TIMED_OUT)
-            worker.due_s = time.monotonic() + time_out_s * timed_out + _MARGIN_S
+            limit_s = time_out_s * len(worker.tasks[0][0]) + _MARGIN_S
+            worker.due_s = time.monotonic() + limit_s
         else:
             worker.due_s = inf
 
-    def _next_chunk(self, worker: _Worker, missions: Iterator[MissionKey]) -> Chunk:
-        """Take a worker's next chunk of missions; empty if there are none."""
-        share = self._left // (self._size * _SHARES)
-        chunk = tuple(islice(missions, max(1, min(worker.chunk, share))))
+    def _next_chunk(self, missions: Iterator[MissionKey]) -> Chunk:
+        """Take the next chunk of missions; empty if there are none."""
+        most = max(1, min(_LARGEST_CHUNK, self._left // (self._size * _SHARES)))
+        chunk: list[MissionKey] = []
+        seems_s = 0.0
+        while len(chunk) < most and seems_s < _CHUNK_S:
+            key = next(missions, None)
+            if key is None:
+                break
+            chunk.append(key)
+            seems_s += self._mission_s[key.manager]
         self._left -= len(chunk)
-        return chunk
+        return tuple(chunk)
+
+    def _note_time(self, chunk: Chunk, took_s: float) -> None:
+        """Note how long a chunk took. Its managers' missions seem quicker by half at most: a few
+        that are say little about the next ones.
+        """
+        seemed_s = sum(self._mission_s[key.manager] for key in chunk)
+        for manager in {key.manager for key in chunk}:
+            self._mission_s[manager] *= max(0.5, took_s / seemed_s)
 
     def _is_to_be_replaced(self, answer: Answer) -> bool:
         """Whether the reasoner of a worker does not come back, and another worker may do better.
@@ -252,14 +270,13 @@ class _Worker:
     tasks, oldest first.
 
     `due_s` is when it has to be done with the oldest, infinite if it has nothing to do; once that
-    is over, it is killed as overdue. `chunk` is how many missions it may be given as the next one.
+    is over, it is killed as overdue.
     """
 
     process: SpawnProcess
     connection: Connection[Any, Any]
     due_s: float
     tasks: deque[_Task] = field(default_factory=deque)
-    chunk: int = _FIRST_CHUNK
     is_overdue: bool = False
 
     def send(self, message: object) -> None:
@@ -388,12 +405,6 @@ class Answer(NamedTuple):
     is_stuck: bool = False
     is_of_chunk: bool = True
     took_s: float = 0.0
-
-    def missions_in(self, seconds: float) -> int:
-        """How many such missions fit into a time; at least one."""
-        if len(self.outcomes) * seconds >= _LARGEST_CHUNK * self.took_s:
-            return _LARGEST_CHUNK
-        return max(1, int(len(self.outcomes) * seconds / self.took_s))
 
 
 def work(connection: Connection[Any, Any]) -> None:

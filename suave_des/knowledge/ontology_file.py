@@ -6,6 +6,8 @@ A file is parsed once on a machine; what it states is kept in the cache.
 from __future__ import annotations
 
 import hashlib
+import os
+import platform
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -138,9 +140,11 @@ def _read(path: Path, content: bytes) -> OntologyFile:
     """Return what a file states, as an earlier process found it if one did: to import rdflib and to
     parse the shipped ontologies takes 0.25 s.
     """
-    made_from = f"{path.stem} {path.suffix} {_programs()}".encode() + content
+    made_from = os.fsencode(f"{path.stem} {path.suffix} {_programs()}") + content
     kept = SharedEntries(private_cache("ontologies"), hashlib.sha256(made_from).hexdigest())
-    for _, (iris, is_xml, base, imports, triples) in kept.read():
+    known = next(kept.read(), None)
+    if known is not None:
+        _, (iris, is_xml, base, imports, triples) = known
         return OntologyFile(
             path,
             content,
@@ -162,7 +166,8 @@ def _read(path: Path, content: bytes) -> OntologyFile:
 def _programs() -> str:
     """Identify the programs that parse files."""
     libraries = [f"{name} {version(name)}" for name in ("rdflib", "lxml")]
-    return f"{libraries} {hash_of_code(Path(__file__).parent)}"
+    python = platform.python_version()
+    return f"{libraries} {python} {hash_of_code(Path(__file__).parent)}"
 
 
 def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:

@@ -154,7 +154,7 @@ _BAD_TURTLE = re.compile(r"at line (\d+) of .*?Bad syntax \((.*?)\) at ", re.DOT
 
 
 def _parse_graph(path: Path, text: str, notation: str) -> Graph:
-    """Parse a file; the graph goes through its triples in the order of the file."""
+    """Parse a file."""
     # goes through triples in the order of the file, each time the same
     graph = Graph("SimpleMemory")
     # it would write the ill-formed 1e3 as 1000

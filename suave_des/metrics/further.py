@@ -224,9 +224,9 @@ def _mark(
             while j < to_y:
                 if was_in_view and before_y[0] <= j < before_y[1]:
                     j = before_y[1]
-                elif grid[i, j] == 0:
+                    continue
+                if grid[i, j] == 0:
                     grid[i, j] = 1
                     count += 1
-                else:
-                    j += 1
+                j += 1
     return count

@@ -12,6 +12,7 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import redirect_stderr
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -21,7 +22,7 @@ import pytest
 from suave_des.campaign import progress as display
 from suave_des.campaign import workers
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.missions import GIVEN_UP, Remark, WorkerError
+from suave_des.campaign.missions import GIVEN_UP, WorkerError
 from suave_des.campaign.progress import Progress
 from suave_des.campaign.results import CampaignResult
 from suave_des.campaign.workers import LocalWorkers
@@ -476,53 +477,87 @@ thread.join()
     assert (done.stdout, done.stderr) == ("done\n", "")
 
 
-@pytest.mark.parametrize(("missions", "counted"), [(3, 3), (10, 10), (100, 10)])
-def test_a_worker_has_the_time_limit_for_each_of_some_missions_of_a_chunk(
-    missions, counted, monkeypatch
-):
+def test_a_worker_has_the_time_limit_of_each_mission_of_its_chunk(monkeypatch):
     monkeypatch.setattr(workers.time, "monotonic", lambda: 1000.0)
-    pool = LocalWorkers(["none"], 1)
-    worker = idle_worker(chunk=missions)
-    pool._left = 10_000
+    pool = pool_for(10_000)
+    worker = idle_worker()
     pool._give_tasks(worker, keys(10_000), time_out_s=20.0)
-    assert len(worker.tasks[0][0]) == missions
-    assert worker.due_s == 1000.0 + counted * 20.0 + workers._MARGIN_S
+    assert worker.due_s == 1000.0 + len(worker.tasks[0][0]) * 20.0 + workers._MARGIN_S
 
 
 def test_chunks_become_smaller_towards_the_end():
-    pool = LocalWorkers(["none"], 2)
-    pool._left = 1000
-    worker = idle_worker(chunk=100)
-    missions = keys(1000)
+    pool, missions = pool_for(500, count=2), keys(500)
+    pool._mission_s[0] = 0.0001
     sizes = []
     while not sizes or sizes[-1]:
-        sizes.append(len(pool._next_chunk(worker, missions)))
-    assert sum(sizes) == 1000
+        sizes.append(len(pool._next_chunk(missions)))
+    assert sum(sizes) == 500
     assert sizes == sorted(sizes, reverse=True)
-    assert (sizes[0], sizes[-2]) == (1000 // (2 * workers._SHARES), 1)
+    assert (sizes[0], sizes[-2]) == (500 // (2 * workers._SHARES), 1)
 
 
 def test_missions_that_are_more_than_was_said_are_given_one_by_one():
-    pool = LocalWorkers(["none"], 1)
-    pool._left = 0
-    assert len(pool._next_chunk(idle_worker(chunk=100), keys(5))) == 1
+    assert len(pool_for(0)._next_chunk(keys(5))) == 1
+
+
+def test_at_first_a_chunk_has_few_missions():
+    assert 8 <= len(pool_for(10_000)._next_chunk(keys(100))) <= 12
+
+
+def sizes_of_chunks(takes_s: list[float], count: int) -> list[int]:
+    """Give chunks one after the other; a mission of manager n takes the n-th time."""
+    pool, sizes = pool_for(1_000_000), []
+    per_manager = 100_000
+    missions = (
+        MissionKey(0, manager, run) for manager in range(len(takes_s)) for run in range(per_manager)
+    )
+    for _ in range(count):
+        chunk = pool._next_chunk(missions)
+        sizes.append(len(chunk))
+        pool._note_time(chunk, sum(takes_s[key.manager] for key in chunk))
+    return sizes
 
 
 @pytest.mark.parametrize(
-    ("missions", "took_s", "fit"),
-    [(10, 0.01, 100), (10, 0.0, 100), (10, 0.5, 2), (10, 30.0, 1), (1, 0.025, 4), (0, 5.0, 1)],
+    ("mission_s", "missions"), [(0.0001, 30), (0.001, 30), (0.0195, 6), (0.3, 1), (5.0, 1)]
 )
-def test_a_chunk_has_as_many_missions_as_fit_into_its_time(missions, took_s, fit):
-    outcomes = [(key, Remark("none", "")) for key in keys(missions)]
-    assert workers.Answer(outcomes, took_s=took_s).missions_in(0.1) == fit
+def test_chunks_come_to_take_their_time(mission_s, missions):
+    assert sizes_of_chunks([mission_s], 20)[-1] == missions
+
+
+def test_missions_of_a_slow_manager_are_few_after_those_of_a_quick_one():
+    pool = pool_for(1_000_000)
+    for _ in range(20):
+        chunk = pool._next_chunk(keys(1000))
+        pool._note_time(chunk, 0.001 * len(chunk))
+    slow = (MissionKey(0, 1, run) for run in range(1, 1000))
+    assert 8 <= len(pool._next_chunk(slow)) <= 12
+
+
+def test_after_one_that_took_long_chunks_grow_step_by_step():
+    pool, missions, sizes = pool_for(1_000_000), keys(1000), []
+    pool._note_time(tuple(keys(1)), 12.0)
+    for _ in range(20):
+        chunk = pool._next_chunk(missions)
+        sizes.append(len(chunk))
+        pool._note_time(chunk, 0.0)
+    assert sizes[:7] == [1] * 7
+    assert all(later <= 2 * size + 1 for size, later in pairwise(sizes))
+    assert sizes[-1] == workers._LARGEST_CHUNK
 
 
 def keys(count: int) -> Iterator[MissionKey]:
     return (MissionKey(0, 0, run) for run in range(1, count + 1))
 
 
-def idle_worker(chunk: int) -> workers._Worker:
-    return workers._Worker(process=None, connection=Quiet(), due_s=math.inf, chunk=chunk)  # type: ignore[arg-type]
+def pool_for(missions: int, count: int = 1) -> LocalWorkers:
+    pool = LocalWorkers(["none"], count)
+    pool._left = missions
+    return pool
+
+
+def idle_worker() -> workers._Worker:
+    return workers._Worker(process=None, connection=Quiet(), due_s=math.inf)  # type: ignore[arg-type]
 
 
 def test_a_worker_without_tasks_has_all_the_time():

@@ -1,5 +1,6 @@
 """What ontology files state is kept between processes; it is always what the file states now."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,29 @@ def test_content_under_another_name_is_parsed_anew(cache, tmp_path):
         path.write_text(text + " <#c> <#d> <#e> .")
     one, other = map(read_anew, paths)  # relative names begin with the file's
     assert {s for s, _, _ in one.triples} != {s for s, _, _ in other.triples}
+
+
+def test_a_file_whose_name_is_not_utf_8_is_read(cache, copied):
+    path = copied.with_name(os.fsdecode(b"mine\xff.owl"))
+    copied.rename(path)
+    assert stated(read_anew(path)) == stated(read_anew(path))
+
+
+def test_two_halves_of_a_surrogate_pair_stay_two(cache, tmp_path):
+    path = tmp_path / "a.ttl"
+    path.write_text(
+        '<http://x.org/a> a <http://www.w3.org/2002/07/owl#Ontology> ; <#label> "\\uD83D\\uDE00" .'
+    )
+    assert stated(read_anew(path)) == stated(read_anew(path))
+
+
+def test_characters_of_all_alphabets_are_kept(cache, tmp_path):
+    path = tmp_path / "a.ttl"
+    path.write_text(
+        '<http://x.org/é> a <http://www.w3.org/2002/07/owl#Ontology> ; <#label> "深い 😀"@ja .'
+    )
+    assert stated(read_anew(path)) == stated(read_anew(path))
+    assert len(list(cache.iterdir())) == 1
 
 
 def test_what_is_damaged_is_parsed_anew(cache, copied):
