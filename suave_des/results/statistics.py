@@ -268,7 +268,8 @@ def search_times(
         ends_s = fitted.quantile_ci(half, 1.0 - CONFIDENCE, method="cloglog")
     is_before = fitted.surv_times < horizon_s
     steps_s = np.diff([0.0, *fitted.surv_times[is_before], horizon_s])
-    restricted = Estimate(float(np.append(1.0, fitted.surv_prob[is_before]) @ steps_s))
+    # not @: its last digit depends on the processor
+    restricted = Estimate(math.fsum(steps_s * np.append(1.0, fitted.surv_prob[is_before])))
     low, high = (median_s if math.isnan(end_s) else float(end_s) for end_s in ends_s)
     if not (~found & (times_s < horizon_s)).any():
         # None is censored before the horizon, so the restricted mean is that of a sample.

@@ -21,6 +21,9 @@ from numpy.typing import ArrayLike
 from suave_des.compiling import Array
 from suave_des.vehicle.kernel import VehicleRecord
 
+_SAME_EVERYWHERE = 12
+"""Decimals of what LAPACK computes that are the same on all processors."""
+
 GRAVITY_M_PER_S2 = 9.80665
 
 
@@ -106,7 +109,9 @@ class VehicleModel:
         It allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a
         BlueROV2) gets none.
         """
-        return _read_only(np.linalg.pinv(self.wrenches, rcond=1e-9))
+        # The last digits depend on the processor, for which LAPACK has code of its own.
+        found = np.linalg.pinv(self.wrenches, rcond=1e-9)
+        return _read_only(found.round(_SAME_EVERYWHERE) + 0.0)  # + 0.0: no minus before a zero
 
 
 class Autopilot(NamedTuple):

@@ -29,6 +29,7 @@ from suave_des.results.statistics import (
     signed_rank_test,
 )
 from tests.helpers.compared import compare_frame, rows
+from tests.helpers.processors import printed_on_each
 
 
 def frame(seeds: tuple[int, int] = (1, 1), **search_times_s: list[float]) -> pandas.DataFrame:
@@ -490,3 +491,18 @@ class TestQuickForms:
 
         n = runs_for(1.0, half_width)
         assert half(n) <= half_width and (n == 2 or half(n - 1) > half_width)
+
+
+SEARCH_TIMES = """
+import numpy as np
+from suave_des.results.statistics import search_times
+
+drawn = np.random.default_rng(1)
+for _ in range(20):
+    times_s = drawn.integers(40, 301, 100).astype(float)
+    print(search_times(times_s, times_s < 300.0, 300.0))
+"""
+
+
+def test_restricted_means_are_the_same_on_all_processors():
+    assert len(set(printed_on_each(SEARCH_TIMES))) == 1

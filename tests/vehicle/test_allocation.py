@@ -6,8 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
+from tests.helpers.processors import printed_on_each
 from tests.helpers.stand_ins import BLUEROV2, NET_BUOYANCY_N, nu, set_nu
 
+ALLOCATIONS = """
+from dataclasses import replace
+from suave_des.vehicle.model import Thruster
+from tests.helpers.stand_ins import BLUEROV2
+
+print(BLUEROV2.allocation.tolist())
+slanted = [Thruster(each.position_m, (0.6, 0.0, 0.8)) for each in BLUEROV2.thrusters[:2]]
+print(replace(BLUEROV2, thrusters=(*slanted, *BLUEROV2.thrusters[2:])).allocation.tolist())
+"""
 B = BLUEROV2.wrenches
 S = np.sqrt(0.5)
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
@@ -68,3 +78,7 @@ def test_thrust_is_limited(make_vehicle):
         1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg
     )
     assert drag_alone < nu(vehicle, STEP_S)[SURGE] == pytest.approx(with_push)
+
+
+def test_it_is_the_same_on_all_processors():
+    assert len(set(printed_on_each(ALLOCATIONS))) == 1
