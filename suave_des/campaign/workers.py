@@ -108,9 +108,8 @@ class LocalWorkers:
         self._ended_in_a_row = 0
         self._stuck_in_a_row = Counter[int]()  # by manager
         self._again = deque[_Task]()
-        self._left = (
-            0  # missions that no worker has been given yet; the caller knows about how many
-        )
+        # Missions that no worker has been given yet; the caller knows about how many.
+        self._left = 0
         # How long a mission of each manager seems to take, by the manager's number.
         self._mission_s = defaultdict[int, float](lambda: _CHUNK_S / _FIRST_CHUNK)
 

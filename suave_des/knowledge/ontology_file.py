@@ -138,7 +138,7 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
 @lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
 def _read(path: Path, content: bytes) -> OntologyFile:
     """Return what a file states, as an earlier process found it if one did: to import rdflib and to
-    parse the shipped ontologies takes 0.25 s.
+    parse the shipped ontologies takes 0.2 s.
     """
     made_from = os.fsencode(f"{path.stem} {path.suffix} {_programs()}") + content
     kept = SharedEntries(private_cache("ontologies"), hashlib.sha256(made_from).hexdigest())
