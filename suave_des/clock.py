@@ -19,6 +19,7 @@ Process = Generator[simpy.Event, Any, None]
 
 
 _process_next = simpy.Environment.step
+_NEVER_S = math.inf
 
 
 class MissionEnvironment(simpy.Environment):
@@ -37,9 +38,11 @@ class MissionEnvironment(simpy.Environment):
 
     def step(self) -> None:
         """Fly to the next event, and process it, or one that the flight has brought about."""
-        next_s = self._queue[0][0] if self._queue else math.inf
-        if self._now < next_s < math.inf:
-            self.fly_to(next_s)
+        queue = self._queue
+        if queue:
+            next_s = queue[0][0]
+            if self._now < next_s < _NEVER_S:
+                self.fly_to(next_s)
         _process_next(self)
 
     def schedule(
@@ -101,20 +104,34 @@ def exactly_at(
     Raises:
         ValueError: that is not a number, which would spoil the order of all other events.
     """
-    if t_s != t_s:
-        raise ValueError(f"the time of an event is {t_s}")
     event = simpy.Event(env)
     event._ok = True
     event._value = None
-    heappush(env._queue, (t_s, priority, next(env._eid), event))
+    _put(env, event, t_s, priority)
     return event
+
+
+def _put(
+    env: simpy.Environment,
+    event: simpy.Event,
+    t_s: float,
+    priority: simpy.events.EventPriority,
+) -> None:
+    if t_s != t_s:
+        raise ValueError(f"the time of an event is {t_s}")
+    heappush(env._queue, (t_s, priority, next(env._eid), event))
 
 
 def until(env: simpy.Environment, t_s: float) -> simpy.Event:
     """An event at mission time t, or now if t has passed: as `env.timeout` makes it, twice as fast."""
+    return exactly_at(env, _reached(env, t_s))
+
+
+def _reached(env: simpy.Environment, t_s: float) -> float:
+    """Return when `env.timeout` would reach mission time t, which is now if t has passed."""
     now_s = env._now
     delay_s = t_s - now_s
-    return exactly_at(env, now_s if delay_s <= 0.0 else now_s + delay_s)
+    return now_s if delay_s <= 0.0 else now_s + delay_s
 
 
 def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], Any]) -> None:
@@ -168,6 +185,9 @@ class Alarm:
         self._env = env
         self._callback = callback
         self._pending: simpy.Event | None = None
+        # An event that has happened is used again: to make another one would take a third of the
+        # time of setting and ringing.
+        self._over: simpy.Event | None = None
 
     def set(self, t_s: float, *, exactly: bool = False, last: bool = False) -> None:
         """Call the function at mission time t, or as the next thing now if t has passed.
@@ -178,18 +198,24 @@ class Alarm:
             last: whether the call comes after all else that happens at that time, whenever it was
                 planned.
         """
-        now_s = self._env.now
-        due_s = t_s if exactly else now_s + max(0.0, t_s - now_s)
+        due_s = t_s if exactly else _reached(self._env, t_s)
         priority = _LAST if last else simpy.events.NORMAL
-        event = exactly_at(self._env, due_s, priority)
-        self._pending = event
+        event = self._over
+        if event is None:
+            event = exactly_at(self._env, due_s, priority)
+        else:
+            event.callbacks = []
+            self._over = None
+            _put(self._env, event, due_s, priority)
         event.callbacks.append(self._ring)
+        self._pending = event
 
     def cancel(self) -> None:
         """Drop the pending call."""
         self._pending = None
 
     def _ring(self, event: simpy.Event) -> None:
+        self._over = event
         if event is self._pending:
             self._pending = None
             self._callback()

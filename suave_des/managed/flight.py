@@ -35,6 +35,9 @@ class Ends(IntEnum):
     LOSS = 3  # the message of a set-point is lost
 
 
+_THERE = Ends.THERE.value
+
+
 @record
 class FlightRecord(Record):
     """What is flown, besides the vehicle."""
@@ -145,7 +148,7 @@ class Flight:
 
     def fly_to(self, t_s: float) -> None:
         """Fly to mission time t; what ends the flight earlier becomes an event."""
-        while (ends := self._fly(t_s)) != Ends.THERE:
+        while (ends := self._fly(t_s)) != _THERE:
             if ends == Ends.SIGHT:
                 camera = self.state.camera
                 seen_s = camera.next_row * STEP_S

@@ -27,22 +27,61 @@ _Regions = tuple[int, ...]
 
 
 class CallTimes:
-    """Calls a manager at its times: once a period, or, if it is event-triggered, only at those at
-    which something may be different.
-
-    After a call that changed nothing, an event-triggered manager sleeps. It wakes when its state
-    changes, and at the first of its times at which the measured values are in regions (between
-    which thresholds each of them is) in which it has not been called since the last change, or in
-    which they will not stay until the call has read them.
+    """Calls a manager at its times, once a period; none while a call is under way.
 
     Args:
         call: the call.
         times: the manager's period and its first time, s.
-        depends_on: the measurements that an event-triggered manager depends on, with its
-            thresholds; None: it is called at each of its times.
-        is_event_triggered: whether calls of such a manager are left out, if not in this mission.
-            Its calls come after all else of their time: a call that was planned long before finds
-            what one finds that was planned a period before.
+    """
+
+    def __init__(
+        self, env: simpy.Environment, call: Callable[[], None], times: tuple[float, float]
+    ) -> None:
+        self._env = env
+        self.period_s, first_s = times
+        self._next_s = first_s  # the first of its times after the last call
+        self._alarm = Alarm(env, call)
+        self._alarm.set(first_s)
+
+    def go_on(self, changed: bool, may_sleep: bool) -> None:
+        """Plan the next call when one is over.
+
+        Args:
+            changed: whether the call has changed anything.
+            may_sleep: whether another one right now would change nothing.
+        """
+        self._alarm.set(self._time_after(self._env.now))
+
+    def _time_after(self, t_s: float) -> float:
+        while self._next_s <= t_s:
+            self._next_s += self.period_s
+        return self._next_s
+
+    def wake(self) -> None:
+        """Note that the manager's state has changed."""
+
+    def close(self) -> None:
+        """Call no more."""
+        self._alarm.cancel()
+        del self._alarm
+
+
+class EventTriggeredTimes(CallTimes):
+    """Calls an event-triggered manager only at those of its times at which something may be
+    different.
+
+    After a call that changed nothing, the manager sleeps. It wakes when its state changes, and at
+    the first of its times at which the measured values are in regions (between which thresholds
+    each of them is) in which it has not been called since the last change, or in which they will
+    not stay until the call has read them.
+
+    Its calls come after all else of their time: a call that was planned long before finds what one
+    finds that was planned a period before.
+
+    Args:
+        depends_on: the measurements that the manager depends on, with its thresholds; None: no
+            call is left out in this mission.
+        reads_for_s: returns for how long a call that began now would read values.
     """
 
     def __init__(
@@ -51,20 +90,15 @@ class CallTimes:
         call: Callable[[], None],
         times: tuple[float, float],
         depends_on: _DependsOn | None,
-        *,
-        is_event_triggered: bool = False,
+        reads_for_s: Callable[[], float],
     ) -> None:
-        self._env = env
+        super().__init__(env, self._ring, times)
+        self._call = call
         self._depends_on = depends_on
-        self.period_s, first_s = times
-        self._comes_last = is_event_triggered
-        self._next_s = first_s  # the first of its times after the last call
+        self._reads_for_s = reads_for_s
         self._sleeps = False
         # Regions in which a call has changed nothing, and for how long one in them reads values.
         self._idle: dict[_Regions, float] = {}
-        self._call = call
-        self._alarm = Alarm(env, self._ring)
-        self._alarm.set(first_s)
 
     def _ring(self) -> None:
         self._sleeps = False
@@ -75,22 +109,15 @@ class CallTimes:
         self._idle.clear()
         if self._sleeps:
             self._sleeps = False
-            next_s = summed_tick(self._env.now, self._next_s, self.period_s)
-            self._alarm.set(next_s, last=self._comes_last)
+            self._alarm.set(summed_tick(self._env.now, self._next_s, self.period_s), last=True)
 
-    def go_on(self, changed: bool, may_sleep: bool, reads_for_s: float) -> None:
-        """Plan the next call when one is over.
-
-        Args:
-            changed: whether the call has changed anything.
-            may_sleep: whether another one right now would change nothing.
-            reads_for_s: for how long one that began now would read values.
-        """
+    def go_on(self, changed: bool, may_sleep: bool) -> None:
+        """Plan the next call when one is over."""
         now_s = self._env.now
-        while self._next_s <= now_s:
-            self._next_s += self.period_s
+        next_s = self._time_after(now_s)
         if changed:
             self._idle.clear()
+        reads_for_s = self._reads_for_s()
         # In the first period now + (t - now) may miss the next time t by rounding, and by another
         # amount if the call is set anew when the manager wakes. Later t is at most 2 now, so that
         # nothing is lost.
@@ -105,9 +132,9 @@ class CallTimes:
                 self._sleeps = True
                 call_s = self._next_needed_s(depends_on, regions, until_s)
                 if call_s < inf:
-                    self._alarm.set(call_s, exactly=True, last=self._comes_last)
+                    self._alarm.set(call_s, exactly=True, last=True)
                 return
-        self._alarm.set(self._next_s, last=self._comes_last)
+        self._alarm.set(next_s, last=True)
 
     def _is_foreseen(self, depends_on: _DependsOn) -> bool:
         """Whether the tables have all that a left-out call would read: either nothing can be
@@ -138,9 +165,9 @@ class CallTimes:
 
     def close(self) -> None:
         """Call no more."""
+        super().close()
         self._sleeps = False
-        self._alarm.cancel()
-        del self._alarm, self._call
+        del self._call, self._reads_for_s
 
 
 def _regions_at(depends_on: _DependsOn, t_s: float) -> tuple[_Regions, float]:

@@ -20,7 +20,7 @@ from suave_des.hooks import (
 from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.simulation.calls import RAISED, AdaptationCall, CallTimes
+from suave_des.simulation.calls import RAISED, AdaptationCall, CallTimes, EventTriggeredTimes
 
 _T = TypeVar("_T")
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
@@ -73,19 +73,18 @@ class ManagerHost:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         if times is None:
             return
+        env = self.system.env
+        if declared is None:
+            self._times = CallTimes(env, self._adapt, times)
+            return
         depends_on = None
-        if declared is not None and not self.system.recorded:  # a recorded mission makes every call
+        if not self.system.recorded:  # a recorded mission makes every call
             measurements = self.system.measurements
             depends_on = [
                 (measurements[name], declared[name]) for name in measurements if name in declared
             ]
-        self._times = CallTimes(
-            self.system.env,
-            self._adapt,
-            times,
-            depends_on,
-            is_event_triggered=declared is not None,
-        )
+        reads_for_s = partial(self._guarded, reading_time_of, self.manager)
+        self._times = EventTriggeredTimes(env, self._adapt, times, depends_on, reads_for_s)
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -142,7 +141,7 @@ class ManagerHost:
         adaptation = self._guarded(self.manager.adapt)
         if adaptation is None:
             # A call that was refused something would ask again.
-            self._go_on(times, modes.requests > requests, modes.refusals == refusals)
+            times.go_on(modes.requests > requests, modes.refusals == refusals)
         elif isinstance(adaptation, GeneratorType | Generator):  # the former is asked for quickly
             over = partial(self._adapted, times, self.system.env.now)
             AdaptationCall(self.system.env, adaptation, over, self.error_of).resume()
@@ -152,10 +151,7 @@ class ManagerHost:
     def _adapted(self, times: CallTimes, began_s: float, result: object) -> None:
         """Go on after a call of `adapt` that has taken mission time."""
         in_time = self.system.env.now - began_s < times.period_s  # no call was due meanwhile
-        self._go_on(times, True, in_time and result is True)
-
-    def _go_on(self, times: CallTimes, changed: bool, may_sleep: bool) -> None:
-        times.go_on(changed, may_sleep, self._guarded(reading_time_of, self.manager))
+        times.go_on(True, in_time and result is True)
 
     def _guarded(self, hook: Callable[..., _T], *arguments: Any) -> _T:
         try:
