@@ -29,15 +29,8 @@ with warnings.catch_warnings(), hidden("yaml", even_if_loaded=True):
     import numba
     from numba.core import caching, compiler, serialize
     from numba.core.dispatcher import Dispatcher
-    from numba.core.runtime.nrt import rtsys
 numba.core.config._config_fname = os.devnull
 
-# What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg,
-# which takes 0.2 s and is used by no inner loop. There is one, as scipy is installed; what uses it
-# imports it then.
-with hidden("scipy.linalg"):
-    from numba.np import arraymath
-arraymath._HAVE_BLAS = True
 _config: Any = numba.config
 # Independent operations of a step are done side by side: a tenth less time, the same results.
 _config.SLP_VECTORIZE = 1
@@ -57,9 +50,11 @@ _F = TypeVar("_F", bound=Callable[..., object])
 
 def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers on its first call (division by zero gives inf or
-    nan, as in numpy).
+    nan, as in numpy). It cannot make arrays: its caller does.
     """
-    dispatcher: Any = numba.njit(error_model="numpy")(function)
+    # Without numba's runtime, which counts references to arrays: an inner loop needs none, and
+    # counting them takes half of a short call's time.
+    dispatcher: Any = numba.njit(error_model="numpy", _nrt=False)(function)
     dispatcher._cache = _CodeCache(dispatcher)
     return cast(_F, dispatcher)
 
@@ -139,9 +134,8 @@ class _CodeCache(caching._Cache):
     def load_overload(self, signature: object, target_context: Any) -> object:
         """Load the machine code for a signature; None if there is none that can be used."""
         with suppress(Exception):  # there is no end to what a file leads to
-            # The functions of numba that machine code calls. numba's own cache calls
-            # target_context.refresh() here: all that compiling needs, which takes 0.2 s.
-            rtsys.initialize(target_context)
+            # numba's own cache calls target_context.refresh() first: all that compiling needs,
+            # which takes 0.2 s, and its runtime, which is not used here.
             path, made_from = self._place(signature, target_context.codegen())
             content = path.read_bytes()
             digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
@@ -149,6 +143,7 @@ class _CodeCache(caching._Cache):
                 path.touch()
                 parts = pickle.loads(content)
                 return compiler.CompileResult._rebuild(target_context, *parts)
+        _prepare_to_compile()
         return None
 
     def save_overload(self, signature: object, data: Any) -> None:
@@ -179,6 +174,15 @@ class _CodeCache(caching._Cache):
         made_from += "\n".join(_ingredients(self._dispatcher, (), [])).encode()
         name = f"{function.__name__}-{sha256(made_from).hexdigest()[:40]}.nbc"
         return Path(folder) / name, made_from
+
+
+def _prepare_to_compile() -> None:
+    """Load what numba loads when it compiles, but for scipy.linalg, which it imports only to see that
+    there is a BLAS: that takes 0.2 s, and no inner loop uses one.
+    """
+    with hidden("scipy.linalg"):
+        from numba.np import arraymath
+    arraymath._HAVE_BLAS = True  # there is one, as scipy is installed; what uses it imports it then
 
 
 _SETTING = (

@@ -180,23 +180,31 @@ print(bool(own), [each.py_func.__name__ for each in own if each.stats.cache_miss
 """
 
 
-ALLOCATES = """
+CALLS = """
+import math
 import numpy
 from suave_des.compiling import compiled
 
 @compiled
-def solved(matrix):
-    return (numpy.linalg.inv(matrix) @ matrix).sum() + numpy.zeros(3).sum() + numpy.sin(matrix[0, 0])
+def called(matrix, x):
+    if x < 0.0:
+        raise ValueError("negative")
+    matrix[1] = numpy.sin(matrix[0, 0]) ** x
+    return math.gamma(x) + math.atan2(matrix[1, 0], numpy.rint(x)) + abs(complex(x, x) ** x)
 
-print(solved(numpy.array([[1.0, 2.0], [3.0, 5.0]])), dict(solved.stats.cache_hits) != {})
+print(called(numpy.array([[1.0, 2.0], [3.0, 5.0]]), 2.5), dict(called.stats.cache_hits) != {})
+try:
+    called(numpy.zeros((2, 2)), -1.0)
+except ValueError as error:
+    print(error)
 """
 
 
 def test_kept_code_finds_what_it_calls(tmp_path):
-    first, second = (python("-c", ALLOCATES, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
+    first, second = (python("-c", CALLS, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2))
     assert (first.returncode, second.returncode) == (0, 0), second.stderr
-    total, was_found = second.stdout.split()
-    assert (total, was_found) == (first.stdout.split()[0], "True")
+    assert second.stdout.split()[1:] == ["True", "negative"]
+    assert second.stdout.split()[0] == first.stdout.split()[0]
 
 
 def test_a_process_compiles_nothing_of_a_mission_that_another_has_flown():
