@@ -45,6 +45,10 @@ _LIBRARIES = ("builtins", "math", "numba", "numpy")
 """What is in them is known by its name, as their versions are."""
 _DIGEST_BYTES = sha256().digest_size
 _MOST_FILES = 256
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+"""Of numba: without its runtime, which counts references to arrays. An inner loop needs none, and
+counting them takes half of a short call's time.
+"""
 _F = TypeVar("_F", bound=Callable[..., object])
 
 
@@ -52,9 +56,7 @@ def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers on its first call (division by zero gives inf or
     nan, as in numpy). It cannot make arrays: its caller does.
     """
-    # Without numba's runtime, which counts references to arrays: an inner loop needs none, and
-    # counting them takes half of a short call's time.
-    dispatcher: Any = numba.njit(error_model="numpy", _nrt=False)(function)
+    dispatcher: Any = numba.njit(**_OPTIONS)(function)
     dispatcher._cache = _CodeCache(dispatcher)
     return cast(_F, dispatcher)
 
