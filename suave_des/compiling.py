@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import pickle
 import platform
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from enum import Enum, EnumType
 from hashlib import sha256
 from importlib.metadata import version
@@ -135,7 +137,7 @@ class _CodeCache(caching._Cache):
 
     def load_overload(self, signature: object, target_context: Any) -> object:
         """Load the machine code for a signature; None if there is none that can be used."""
-        with suppress(Exception):  # there is no end to what a file leads to
+        with suppress(Exception), _without_linear_algebra():  # no end to what a file leads to
             # numba's own cache calls target_context.refresh() first: all that compiling needs,
             # which takes 0.2 s, and its runtime, which is not used here.
             path, made_from = self._place(signature, target_context.codegen())
@@ -145,7 +147,8 @@ class _CodeCache(caching._Cache):
                 path.touch()
                 parts = pickle.loads(content)
                 return compiler.CompileResult._rebuild(target_context, *parts)
-        _prepare_to_compile()
+        with _without_linear_algebra():  # or compiling would load it
+            importlib.import_module("numba.np.arraymath")
         return None
 
     def save_overload(self, signature: object, data: Any) -> None:
@@ -178,13 +181,17 @@ class _CodeCache(caching._Cache):
         return Path(folder) / name, made_from
 
 
-def _prepare_to_compile() -> None:
-    """Load what numba loads when it compiles, but for scipy.linalg, which it imports only to see that
+@contextmanager
+def _without_linear_algebra() -> Iterator[None]:
+    """Let numba load its array functions without scipy.linalg, which it imports only to see that
     there is a BLAS: that takes 0.2 s, and no inner loop uses one.
     """
     with hidden("scipy.linalg"):
-        from numba.np import arraymath
-    arraymath._HAVE_BLAS = True  # there is one, as scipy is installed; what uses it imports it then
+        yield
+    arraymath: Any = sys.modules.get("numba.np.arraymath")
+    if arraymath is not None:
+        # There is a BLAS, as scipy is installed; what uses it imports it then.
+        arraymath._HAVE_BLAS = True
 
 
 _SETTING = (
