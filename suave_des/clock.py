@@ -185,8 +185,8 @@ class Alarm:
         self._env = env
         self._callback = callback
         self._pending: simpy.Event | None = None
-        # An event that has happened is used again: to make another one would take a third of the
-        # time of setting and ringing.
+        # An event that has happened is used again: to make another one each time would take a
+        # quarter longer from setting the alarm to the end of its call.
         self._over: simpy.Event | None = None
 
     def set(self, t_s: float, *, exactly: bool = False, last: bool = False) -> None:

@@ -221,6 +221,8 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
         value = value.py_func
     if str(getattr(value, "__module__", "")).partition(".")[0] in _LIBRARIES:
         yield f"{value.__module__}.{value.__name__}"
+    elif isinstance(value, np.ufunc) and value is getattr(np, value.__name__, None):
+        yield f"numpy.{value.__name__}"  # before numpy 2.2 they do not say where they are from
     elif isfunction(value):
         if value not in seen:
             seen.append(value)
