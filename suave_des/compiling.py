@@ -219,10 +219,8 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
     if isinstance(value, Dispatcher):
         yield f"compiled with {sorted(value.targetoptions.items())}"
         value = value.py_func
-    if str(getattr(value, "__module__", "")).partition(".")[0] in _LIBRARIES:
-        yield f"{value.__module__}.{value.__name__}"
-    elif isinstance(value, np.ufunc) and value is getattr(np, value.__name__, None):
-        yield f"numpy.{value.__name__}"  # before numpy 2.2 they do not say where they are from
+    if _module_of(value).partition(".")[0] in _LIBRARIES:
+        yield f"{_module_of(value)}.{value.__name__}"
     elif isfunction(value):
         if value not in seen:
             seen.append(value)
@@ -243,6 +241,12 @@ def _ingredients(value: Any, names: Sequence[str], seen: list[object]) -> Iterat
         yield f"{type(value).__name__} {value!r}"
     else:
         raise ValueError(f"unknown: {value!r}")
+
+
+def _module_of(value: Any) -> str:
+    if isinstance(value, np.ufunc):
+        return "numpy"  # before its version 2.2 they do not say so themselves
+    return str(getattr(value, "__module__", ""))
 
 
 def _of_function(function: FunctionType, seen: list[object]) -> Iterator[str]:
