@@ -197,6 +197,9 @@ class Alarm:
             exactly: see `exactly_at`.
             last: whether the call comes after all else that happens at that time, whenever it was
                 planned.
+
+        Raises:
+            ValueError: the time is not a number.
         """
         due_s = t_s if exactly else _reached(self._env, t_s)
         priority = _LAST if last else simpy.events.NORMAL

@@ -31,6 +31,7 @@ with warnings.catch_warnings(), hidden("yaml", even_if_loaded=True):
     import numba
     from numba.core import caching, compiler, serialize
     from numba.core.dispatcher import Dispatcher
+    from numba.core.runtime.nrt import rtsys
 numba.core.config._config_fname = os.devnull
 
 _config: Any = numba.config
@@ -49,14 +50,18 @@ _DIGEST_BYTES = sha256().digest_size
 _MOST_FILES = 256
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 """Of numba: without its runtime, which counts references to arrays. An inner loop needs none, and
-counting them takes half of a short call's time.
+counting them takes up to half of a short call's time.
 """
+_RUNTIME = b"NRT_"
+"""What the names of the runtime's functions begin with; some arguments need them all the same."""
 _F = TypeVar("_F", bound=Callable[..., object])
 
 
 def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers on its first call (division by zero gives inf or
-    nan, as in numpy). It cannot make arrays: its caller does.
+    nan, as in numpy).
+
+    It neither makes arrays nor returns them or parts of them: its caller makes what it fills.
     """
     dispatcher: Any = numba.njit(**_OPTIONS)(function)
     dispatcher._cache = _CodeCache(dispatcher)
@@ -138,16 +143,19 @@ class _CodeCache(caching._Cache):
     def load_overload(self, signature: object, target_context: Any) -> object:
         """Load the machine code for a signature; None if there is none that can be used."""
         with suppress(Exception), _without_linear_algebra():  # no end to what a file leads to
-            # numba's own cache calls target_context.refresh() first: all that compiling needs,
-            # which takes 0.2 s, and its runtime, which is not used here.
+            # numba's own cache calls target_context.refresh() first, which loads all that it needs
+            # to compile, and takes 0.2 s.
             path, made_from = self._place(signature, target_context.codegen())
             content = path.read_bytes()
             digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
             if sha256(made_from + content).digest() == digest:
                 path.touch()
+                if _RUNTIME in content:  # such as for texts; it takes 0.02 s
+                    rtsys.initialize(target_context)
                 parts = pickle.loads(content)
                 return compiler.CompileResult._rebuild(target_context, *parts)
-        with _without_linear_algebra():  # or compiling would load it
+        # Now numba compiles, and would load these, with linear algebra.
+        with _without_linear_algebra():
             importlib.import_module("numba.np.arraymath")
         return None
 

@@ -19,22 +19,42 @@ _one_at_a_time = threading.RLock()
 
 @contextmanager
 def hidden(module: str, *, even_if_loaded: bool = False) -> Iterator[None]:
-    """Hide a module from imports in the block, as if it were not installed; one that is loaded
-    already only `even_if_loaded`.
+    """Hide a module from the imports of this thread in the block, as if it were not installed; one
+    that is loaded already only `even_if_loaded`, and then from all threads.
     """
-    with _one_at_a_time:
-        loaded = sys.modules.get(module)
-        if loaded is not None and not even_if_loaded:
-            yield
-            return
-        sys.modules[module] = None  # type: ignore[assignment]
-        try:
-            yield
-        finally:
-            if loaded is None:
-                del sys.modules[module]
-            else:
+    if module in sys.modules:
+        with _one_at_a_time:
+            loaded = sys.modules[module]
+            if even_if_loaded:
+                sys.modules[module] = None  # type: ignore[assignment]
+            try:
+                yield
+            finally:
                 sys.modules[module] = loaded
+        return
+    finder = _FindsNone(module)
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)
+
+
+class _FindsNone:
+    """Has the import of a module end as if there were none, in the thread that has made this."""
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+        self._thread = threading.get_ident()
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Find nothing, or, asked for the module by the thread, let nobody else find it.
+
+        Raises:
+            ModuleNotFoundError: it is the module.
+        """
+        if name == self._module and threading.get_ident() == self._thread:
+            raise ModuleNotFoundError(f"{name} is hidden", name=name)
 
 
 def leave_current_folder() -> None:

@@ -186,15 +186,15 @@ import numpy
 from suave_des.compiling import compiled
 
 @compiled
-def called(matrix, x):
+def called(matrix, x, text):
     if x < 0.0:
         raise ValueError("negative")
     matrix[1] = numpy.sin(matrix[0, 0]) ** x
-    return math.gamma(x) + math.atan2(matrix[1, 0], numpy.rint(x)) + abs(complex(x, x) ** x)
+    return len(text) + math.gamma(x) + math.atan2(matrix[1, 0], numpy.rint(x)) + abs(complex(x, x) ** x)
 
-print(called(numpy.array([[1.0, 2.0], [3.0, 5.0]]), 2.5), dict(called.stats.cache_hits) != {})
+print(called(numpy.array([[1.0, 2.0], [3.0, 5.0]]), 2.5, "ab"), dict(called.stats.cache_hits) != {})
 try:
-    called(numpy.zeros((2, 2)), -1.0)
+    called(numpy.zeros((2, 2)), -1.0, "ab")
 except ValueError as error:
     print(error)
 """

@@ -3,6 +3,7 @@
 import ast
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,9 @@ print(*algebra(numpy.array([[1.0, 2.0], [3.0, 5.0]])), "scipy.linalg" in sys.mod
 
 import scipy.linalg
 print(scipy.linalg.det(numpy.eye(2)))
+
+from numba.np import arraymath
+print(arraymath._HAVE_BLAS)
 """
 
 
@@ -74,11 +78,11 @@ def test_what_is_not_used_is_not_loaded(program, unused):
 
 
 def test_linear_algebra_is_loaded_by_what_uses_it_only():
-    first, second, third = python("-c", COMPILING).stdout.splitlines()
+    first, second, third, has_blas = python("-c", COMPILING).stdout.splitlines()
     assert first == "3.0 False"
     assert [round(float(number), 9) for number in second.split()[:2]] == [7.0, -5.0]
     assert second.endswith("True")
-    assert third == "1.0"
+    assert (third, has_blas) == ("1.0", "True")
 
 
 def test_java_starts_without_numpy_which_can_be_used_with_it():
@@ -90,6 +94,13 @@ def test_what_is_hidden_cannot_be_imported():
     with pytest.raises(ImportError), hidden("this"):
         __import__("this")
     assert "this" not in sys.modules
+
+
+def test_what_is_hidden_can_be_imported_by_other_threads():
+    sys.modules.pop("this", None)
+    with hidden("this"), ThreadPoolExecutor(1) as other:
+        found = other.submit(__import__, "this").result()
+    assert found is sys.modules["this"]
 
 
 def test_what_is_loaded_is_not_hidden():

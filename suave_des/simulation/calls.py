@@ -47,18 +47,20 @@ class CallTimes:
         """Plan the next call when one is over.
 
         Args:
-            changed: whether the call has changed anything.
+            changed: whether the call has changed anything; this, and the next, make a difference
+                to event-triggered managers only.
             may_sleep: whether another one right now would change nothing.
         """
-        self._alarm.set(self._time_after(self._env.now))
+        self._pass(self._env.now)
+        self._alarm.set(self._next_s)
 
-    def _time_after(self, t_s: float) -> float:
+    def _pass(self, t_s: float) -> None:
+        """Let the next time be the first one after t."""
         while self._next_s <= t_s:
             self._next_s += self.period_s
-        return self._next_s
 
     def wake(self) -> None:
-        """Note that the manager's state has changed."""
+        """Note that the manager's state has changed, which changes none of its times."""
 
     def close(self) -> None:
         """Call no more."""
@@ -114,7 +116,7 @@ class EventTriggeredTimes(CallTimes):
     def go_on(self, changed: bool, may_sleep: bool) -> None:
         """Plan the next call when one is over."""
         now_s = self._env.now
-        next_s = self._time_after(now_s)
+        self._pass(now_s)
         if changed:
             self._idle.clear()
         reads_for_s = self._reads_for_s()
@@ -134,7 +136,7 @@ class EventTriggeredTimes(CallTimes):
                 if call_s < inf:
                     self._alarm.set(call_s, exactly=True, last=True)
                 return
-        self._alarm.set(next_s, last=True)
+        self._alarm.set(self._next_s, last=True)
 
     def _is_foreseen(self, depends_on: _DependsOn) -> bool:
         """Whether the tables have all that a left-out call would read: either nothing can be

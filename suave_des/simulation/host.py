@@ -64,7 +64,6 @@ class ManagerHost:
             self.manager.recall(self.learned, self.training)
             times = times_of(self.manager)
             declared = dependencies_of(self.manager)
-            reading_time_of(self.manager)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
@@ -83,7 +82,7 @@ class ManagerHost:
             depends_on = [
                 (measurements[name], declared[name]) for name in measurements if name in declared
             ]
-        reads_for_s = partial(self._guarded, reading_time_of, self.manager)
+        reads_for_s = partial(reading_time_of, self.manager)
         self._times = EventTriggeredTimes(env, self._adapt, times, depends_on, reads_for_s)
 
     def start(self) -> None:

@@ -7,6 +7,7 @@ import simpy
 
 from suave_des import Simulator, load_scenario
 from suave_des.clock import Alarm, call_at
+from suave_des.simulation.calls import EventTriggeredTimes
 from suave_des.simulation.mission import Mission
 
 
@@ -21,6 +22,21 @@ def test_the_last_call_of_a_time_comes_after_all_else(planned):
         alarm.set(4.0, last=True)
     env.run()
     assert order == ["other", "alarm"]
+
+
+@pytest.mark.parametrize("sleeps", [True, False], ids=["woken", "not left out"])
+def test_the_calls_of_an_event_triggered_manager_come_after_all_else_of_their_time(sleeps):
+    env, order = simpy.Environment(), []
+
+    def call() -> None:
+        order.append("call")
+        times.go_on(changed=False, may_sleep=sleeps)
+
+    times = EventTriggeredTimes(env, call, (2.0, 2.0), [], lambda: 0.0)
+    call_at(env, 3.0, times.wake)
+    call_at(env, 3.5, lambda: call_at(env, 4.0, lambda: order.append("other")))
+    env.run(5.0)
+    assert order == ["call", "other", "call"]
 
 
 @pytest.fixture(scope="module", params=[1.0, 3.0])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from suave_des.clock import (
     Alarm,
     MissionEnvironment,
+    call_at,
     call_next,
     exactly_at,
     tick_at_or_after,
@@ -74,6 +75,40 @@ def test_setting_an_alarm_anew_replaces_the_call_that_was_pending():
     assert called == [6.0]
 
 
+def test_an_alarm_at_a_time_that_has_passed_rings_now():
+    env, called = simpy.Environment(), []
+    alarm = Alarm(env, lambda: called.append(env.now))
+    call_at(env, 5.0, lambda: alarm.set(2.0))
+    call_at(env, 6.0, lambda: called.append(env.now))
+    env.run()
+    assert called == [5.0, 6.0]
+
+
+def test_an_alarm_that_has_rung_rings_each_time_that_it_is_set_again():
+    env, called = simpy.Environment(), []
+
+    def ring() -> None:
+        called.append(env.now)
+        if env.now < 3.0:
+            alarm.set(9.0)
+            alarm.set(env.now + 1.0)
+
+    alarm = Alarm(env, ring)
+    alarm.set(1.0)
+    env.run()
+    assert called == [1.0, 2.0, 3.0]
+
+
+def test_nothing_is_flown_for_an_event_that_never_comes():
+    env, flown = MissionEnvironment(), []
+    env.fly_to = flown.append
+    env.timeout(4.0)
+    env.timeout(math.inf)
+    env.step()
+    env.step()
+    assert flown == [4.0]
+
+
 def test_a_cancelled_alarm_does_not_ring():
     env, called = simpy.Environment(), []
     alarm = Alarm(env, lambda: called.append(env.now))
@@ -106,8 +141,9 @@ NAN = float("nan")
         lambda env: env.schedule(env.event(), delay=NAN),
         lambda env: exactly_at(env, NAN),
         lambda env: until(env, NAN),
+        lambda env: Alarm(env, list).set(NAN),
     ],
-    ids=["timeout", "schedule", "exactly_at", "until"],
+    ids=["timeout", "schedule", "exactly_at", "until", "alarm"],
 )
 def test_a_time_that_is_not_a_number_is_refused_where_it_is_given(schedule):
     env = MissionEnvironment()
