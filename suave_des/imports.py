@@ -14,30 +14,28 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType, ModuleType
 
-_one_at_a_time = threading.RLock()
-
 
 @contextmanager
 def hidden(module: str, *, even_if_loaded: bool = False) -> Iterator[None]:
     """Hide a module from the imports of this thread in the block, as if it were not installed; one
     that is loaded already only `even_if_loaded`, and then from all threads.
     """
-    if module in sys.modules:
-        with _one_at_a_time:
-            loaded = sys.modules[module]
-            if even_if_loaded:
-                sys.modules[module] = None  # type: ignore[assignment]
-            try:
-                yield
-            finally:
-                sys.modules[module] = loaded
-        return
-    finder = _FindsNone(module)
-    sys.meta_path.insert(0, finder)
-    try:
+    if module not in sys.modules:
+        finder = _FindsNone(module)
+        sys.meta_path.insert(0, finder)
+        try:
+            yield
+        finally:
+            sys.meta_path.remove(finder)
+    elif even_if_loaded:
+        loaded = sys.modules[module]
+        sys.modules[module] = None  # type: ignore[assignment]
+        try:
+            yield
+        finally:
+            sys.modules[module] = loaded
+    else:
         yield
-    finally:
-        sys.meta_path.remove(finder)
 
 
 class _FindsNone:
